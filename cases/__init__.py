@@ -11,8 +11,10 @@ A case is one module in `library` with three public names:
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from os import PathLike, fspath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from crossbody.cases.entry_points import checked_arguments
@@ -86,6 +88,30 @@ __all__ = [
     "summary",
     "variants",
 ]
+
+
+def _warn_of_another_checkout() -> None:
+    """Say so where a folder called crossbody beside the script came before what is installed from elsewhere."""
+    here, whole = Path(__file__).parents[1], sys.modules["crossbody"]
+    if whole.__file__ or not any(Path(place).resolve() == here.resolve() for place in whole.__path__):
+        return  # a regular package comes before such a folder
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    try:
+        told = distribution("crossbody").read_text("direct_url.json") or ""
+    except PackageNotFoundError:  # nothing is installed that could be meant
+        return
+    if '"editable": true' in told and here.resolve().as_uri() not in told:
+        import warnings
+
+        warnings.warn(
+            f"crossbody is imported from {here}, a folder of that name beside the script, instead of the editable "
+            "installation: rename the folder, or install it (pip install -e).",
+            RuntimeWarning, stacklevel=2,
+        )  # fmt: skip
+
+
+_warn_of_another_checkout()
 
 
 def __getattr__(name: str) -> Any:

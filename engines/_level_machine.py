@@ -169,6 +169,8 @@ class LevelMachine:
         if not any(i in below and which == PUSH for i, which in fired):
             return frozenset()
         still = [i for i in below if h[i] <= 0.0 and hd[i] <= self.slow]
+        if not still:  # each of them lifts, but for rounding
+            return frozenset()
         press, noise = self.rows.pressure(q, v, self.rows.accelerate(q, v, modes)[0], still)
         return frozenset((i, PUSH) for i, one, rounding in zip(still, press, noise, strict=True) if one > rounding)
 

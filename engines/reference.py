@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -32,6 +33,9 @@ UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
 KEPT = "kept"
 TRACED = {KEPT: None, "yes": True, "no": False}
 """Which code of a scene's sweeps is taken: that which was compiled for this model before; or now, if need be; none."""
+_ROWS, _STATE = re.compile(r"\b[Rr]ows? \[(\d+(?:, \d+)*)\]"), re.compile(r", q = \[[^]]*\], v = \[[^]]*\]")
+LONG = 16
+"""Most numbers of a state that a message shows."""
 SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
@@ -58,6 +62,8 @@ class ReferenceRun(Run):
     def motion(self) -> Trajectory:
         """Integrate from the start, whatever shapes meet that have no rows."""
         trajectory: Trajectory = self.inner.trajectory(*self.inner.go())
+        if not trajectory.outcome.ok:
+            trajectory = replace(trajectory, message=by_name(trajectory.message, self.case.contacts))
         scene = self.case.scene if self.case.general else None
         return trajectory if scene is None else determined(scene, trajectory)
 
@@ -70,6 +76,24 @@ class ReferenceRun(Run):
         return own | (told(self.system.p) if told else {})
 
 
+def by_name(message: str, contacts: Sequence[str]) -> str:
+    """Return a message with the names of contacts for the numbers of rows, and without a long state.
+
+    Args:
+        message: of a run of the reference, which knows rows by number, with the state at its end.
+        contacts: names of the rows.
+    """
+
+    def named(found: re.Match[str]) -> str:
+        rows = [int(text) for text in found[1].split(",")]
+        return found[0] if max(rows) >= len(contacts) else f"{found[0]} ({', '.join(contacts[i] for i in rows)})"
+
+    state = _STATE.search(message)
+    if state is not None and state[0].count(",") > LONG:
+        message = message.replace(state[0], "; its state is the last of the motion")
+    return _ROWS.sub(named, message)
+
+
 def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
     from crossbody.cases.files.contacts import first_contact
@@ -79,7 +103,8 @@ def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     model = model_of(Path(case.file), str(case.parameters.get("without", "")))
     pairs = () if case.scene is None else (*(one.pair for one in contacts(case.scene)), *inert(case.scene))
     known = {frozenset((pair.first, pair.second)) for pair in pairs}
-    found = first_contact(model, run.t, run.q, run.v, known) if run.outcome.ok else ""
+    looked = run.outcome in (Outcome.FINISHED, Outcome.TIME_LIMIT)
+    found = first_contact(model, run.t, run.q, run.v, known) if looked else ""
     return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
 

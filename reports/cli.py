@@ -41,7 +41,7 @@ class _Commands(click.Group):
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
         """Add a command, or a group of such."""
-        text = "Engine, metric, log format, case, ... in a file of your own; repeatable, as [tool.crossbody] plugins."
+        text = "File with your own engine, metric, log format, case, ...; repeatable, or [tool.crossbody] plugins."
         option = click.Option(
             ["--plugin"], metavar="FILE", multiple=True, is_eager=True, expose_value=False, callback=_plug, help=text
         )
@@ -60,7 +60,7 @@ def cli() -> None:
 @click.argument("name", metavar="[CASE or ENGINE]", required=False)
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
 def list_(name: str | None, plain: bool) -> None:
-    """List cases, engines, metrics, stress suites and models of logs; or what CASE or ENGINE has."""
+    """List cases, engines, metrics, stress suites and models of logs; or the details of CASE or ENGINE."""
     from crossbody.reports import described
 
     told = described.everything() if name is None else described.one(name)
@@ -79,13 +79,17 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option(
     "--set-engine", "settings", metavar="[E[:PROFILE].]K=V", multiple=True,
-    help="Setting of one engine, or of all that have it; repeatable.",
+    help="Setting of one engine, or of all engines that have it; repeatable.",
 )  # fmt: skip
-@click.option("--dry-run", "dry", is_flag=True, help="Say what would be run, and run nothing.")
-@click.option("--strict", is_flag=True, help="Exit code 1 too if a number is worse than its regression band allows.")
+@click.option("--dry-run", "dry", is_flag=True, help="Show what would be run, without running it.")
+@click.option("--strict", is_flag=True, help="Exit code 1 also if a number has left its regression band.")
 @click.option(
     "--jobs", type=click.IntRange(0, 1024), default=1, show_default=True, metavar="J",
-    help="Cases at once, in processes; 0: one a processor. Run times are then those beside each other.",
+    help="Cases at once, in processes; 0: one per processor. Run times then include the mutual slowdown.",
+)  # fmt: skip
+@click.option(
+    "--budget", type=options.ABOVE_0, default=5.0, show_default=True, metavar="S",
+    help="Time of a scene's tightest run: its motion is compared as far as that gets; engines may take twelve of it.",
 )  # fmt: skip
 @options.engine_limit
 @options.against
@@ -102,11 +106,15 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
 @cli.command()
 @options.cases
 @click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
-@click.option("--full", is_flag=True, help="Every case, every rung of every ladder; without it some minutes.")
-@click.option("--minutes", type=click.FloatRange(0.1), help="About how long; ladders end earlier for it.")
+@click.option(
+    "--full",
+    is_flag=True,
+    help="Every case and every rung of every ladder; without it, a selection that takes some minutes.",
+)
+@click.option("--minutes", type=click.FloatRange(0.1), help="Approximate total time; ladders are shortened to meet it.")
 @click.option("--against", type=options.PATH, metavar="BASE", help="Folder of an earlier benchmark.")
-@click.option("--skip", "what", flag_value="skip", help="Instead: what is not done that a scene does not need.")
-@click.option("--throughput", "what", flag_value="throughput", help="Instead: many runs at once, in threads.")
+@click.option("--skip", "what", flag_value="skip", help="Instead: measure the work that a scene avoids.")
+@click.option("--throughput", "what", flag_value="throughput", help="Instead: measure many runs at once, in threads.")
 @options.engine_limit
 @speaks
 def bench(what: str | None, **asked: Any) -> int:
@@ -129,7 +137,7 @@ def bench(what: str | None, **asked: Any) -> int:
 @options.out()
 @speaks
 def gapmap(**asked: Any) -> int:
-    """Map energy created and pattern of Newton's cradle over the gap between its balls."""
+    """Map the energy created in Newton's cradle, and its pattern, over the gap between the balls."""
     return _do("maps.gap_map", **asked, command=options.command())
 
 
@@ -138,29 +146,31 @@ def gapmap(**asked: Any) -> int:
 @options.out()
 @speaks
 def stability(**asked: Any) -> int:
-    """Map from which scenes the closed-loop ball maze still comes to its centre."""
+    """Map the starts from which the closed-loop ball maze reaches its centre."""
     return _do("maps.stability_map", **asked, command=options.command())
 
 
 @cli.command()
 @click.argument("names", metavar="[SUITE]...", nargs=-1)
 @options.wanted
-@click.option("--runs", type=int, metavar="N", help="Runs of the first engine over all suites.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of every draw.")
-@click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one a processor.")
+@click.option("--runs", type=int, metavar="N", help="Number of runs of the first engine, over all suites.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all draws.")
+@click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one per processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
-@click.option("--tls-ca", default="", metavar="FILE", help="Certificates (PEM) that a scheduler's must come from.")
-@click.option("--tls-cert", default="", metavar="FILE", help="Certificate (PEM) that is shown to a scheduler.")
-@click.option("--tls-key", default="", metavar="FILE", help="Its key, if it is not in the same file.")
-@click.option("--resume", is_flag=True, help="Go on with the sweep in DIR; it has to be there.")
+@click.option(
+    "--tls-ca", default="", metavar="FILE", help="Certificates (PEM) of the authorities that may sign the scheduler's."
+)
+@click.option("--tls-cert", default="", metavar="FILE", help="Certificate (PEM) to present to the scheduler.")
+@click.option("--tls-key", default="", metavar="FILE", help="Key of --tls-cert, if it is not in the same file.")
+@click.option("--resume", is_flag=True, help="Continue the sweep in DIR, which must exist.")
 @options.out("stress")
 @options.parameters
 @speaks
 def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) -> int:
     """Run suites of extreme scenes, map where each engine stays finite and accurate, and shrink every failure.
 
-    A SUITE may be a case of your own or a robot's file: other laws of its rows, pushes on its bodies, other numbers.
-    A sweep that was interrupted goes on where it stood when the same command is given again.
+    A SUITE may be your own case or a robot file, whose laws, pushes and parameters are then varied.
+    An interrupted sweep continues when the same command is repeated.
     """
     from crossbody.reports.commands.stress import Ask
     from crossbody.reports.sweep.pools import Tls
@@ -175,7 +185,7 @@ def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) ->
 @options.out()
 @speaks
 def bode(**asked: Any) -> int:
-    """Frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
+    """Compute frequency responses of a case (soft_contact) about its equilibrium, with and without feedback."""
     return _do("analyse.bode", **asked, command=options.command())
 
 
@@ -183,25 +193,25 @@ def bode(**asked: Any) -> int:
 @click.argument("name", metavar="CASE")
 @click.option("--variant", "--key", metavar="V", help="Variant of the case; the first if not given.")
 @options.parameters
-@click.option("--at", metavar="K=V", multiple=True, help="Where to look: x, y, z of the flange, m; repeatable.")
-@click.option("--bode", is_flag=True, help="Frequency responses too.")
+@click.option("--at", metavar="K=V", multiple=True, help="Position of the flange (x, y, z), m; repeatable.")
+@click.option("--bode", is_flag=True, help="Add frequency responses.")
 @click.option("--locus", metavar="PARAM=a..b", help="Poles over a parameter of the case.")
 @click.option("--map", "mapped", is_flag=True, help="Stability over the workspace.")
 @click.option("--out", type=options.PATH, metavar="DIR", help="Folder for tables and figures.")
 @speaks
 def analyse(**asked: Any) -> int:
-    """Equilibria of a case, their linear models, poles, ranks, responses and maps."""
+    """Find the equilibria of a case, and their linear models, poles, ranks, responses and maps."""
     return _do("analyse.analyse", **asked, command=options.command())
 
 
 @cli.command()
 @click.argument("folder", metavar="DIR", type=options.PATH)
-@click.option("--single-file", is_flag=True, help="One file with all pages, to be sent.")
+@click.option("--single-file", is_flag=True, help="Write all pages into one file that can be sent.")
 @options.against
 @options.others
 @speaks
 def report(folder: Path, **asked: Any) -> int:
-    """Make the pages of an earlier run again."""
+    """Rewrite the pages of an earlier run."""
     from crossbody.reports.pages import site
 
     made = site.write(folder, **asked).absolute()
@@ -215,14 +225,20 @@ def report(folder: Path, **asked: Any) -> int:
 @cli.command()
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @click.argument("out", metavar="FILE", type=options.PATH)
-@click.option("--case", "case", metavar="CASE:V", default="", help="Which case; the first if not given.")
-@click.option("--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Whose motion.")
-@click.option("--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Instant, s.")
-@click.option("--fps", type=options.ABOVE_0, default=25.0, show_default=True, help="Of a GIF.")
-@click.option("--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Of a GIF, times real time.")
+@click.option("--case", "case", metavar="CASE:V", default="", help="Case and variant; the first if not given.")
+@click.option(
+    "--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Engine whose motion is drawn."
+)
+@click.option(
+    "--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Time of the picture, s."
+)
+@click.option("--fps", type=options.ABOVE_0, default=25.0, show_default=True, help="Frames per second of a GIF.")
+@click.option(
+    "--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Speed of a GIF, as a multiple of real time."
+)
 @speaks
 def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps: float, speed: float) -> int:
-    """Draw a motion of an earlier run: one instant (FILE.svg, FILE.png) or all of it (FILE.gif)."""
+    """Draw a motion of an earlier run: one instant (FILE.svg, FILE.png) or the whole motion (FILE.gif)."""
     from crossbody.reports.pages import picture as drawing
     from crossbody.reports.pages.results import motion
 
@@ -236,16 +252,16 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps
 @cli.command()
 @click.argument("file", metavar="FILE", type=options.PATH)
 @options.readers
-@click.option("--without", default="", metavar="PARTS", help="Parts of the file that no reader is held to.")
+@click.option("--without", default="", metavar="PARTS", help="Parts of the file to leave out of the comparison.")
 @options.reader_limit
-@click.option("--explain", is_flag=True, help="Say which feature is read wrongly, on which line, and how to write it.")
-@click.option("--fix", type=options.PATH, metavar="OUT", help="Write FILE so that more readers agree.")
-@click.option("--force", is_flag=True, help="Let files be written over that were not written so.")
-@click.option("--sarif", type=options.PATH, metavar="F", help="Write the findings as SARIF too.")
-@click.option("--markdown", type=options.PATH, metavar="F", help="Write a summary in Markdown too.")
+@click.option("--explain", is_flag=True, help="Show which feature is read wrongly, on which line, and how to write it.")
+@click.option("--fix", type=options.PATH, metavar="OUT", help="Write an equivalent file on which more readers agree.")
+@click.option("--force", is_flag=True, help="Overwrite files that the same option did not write.")
+@click.option("--sarif", type=options.PATH, metavar="F", help="Also write the findings as SARIF.")
+@click.option("--markdown", type=options.PATH, metavar="F", help="Also write a summary in Markdown.")
 @speaks
 def audit(file: Path, limit: float, **asked: Any) -> int:
-    """Say whether every engine's own reader makes the same robot of FILE (MJCF or URDF), where not, and why."""
+    """Check whether every engine's own reader builds the same robot from FILE (MJCF or URDF); if not, where and why."""
     from crossbody.reports.commands.audit import Ask
 
     return _do("audit.audit", Ask(path=file, seconds=limit, **asked))
@@ -253,23 +269,23 @@ def audit(file: Path, limit: float, **asked: Any) -> int:
 
 @cli.command()
 @options.readers
-@click.option("--feature", default="", metavar="TEXT", help="Features alone whose name has TEXT in it.")
+@click.option("--feature", default="", metavar="TEXT", help="Only features whose name contains TEXT.")
 @options.reader_limit
 @options.out()
 @speaks
 def conformance(engines: tuple[str, ...], feature: str, limit: float, out: Path) -> int:
-    """Show what every engine's own reader makes of each feature of robot files, by one small file a feature."""
+    """Show how every engine's own reader handles each feature of robot files, with a minimal file for each."""
     return _do("conformance.conformance", engines, feature, limit, out, options.command())
 
 
 @cli.command()
 @options.replayed
 @options.wanted
-@options.time_limit("An engine that has not come back by then is ended, s.")
-@click.option("--closed-loop", is_flag=True, help="Recorded references through the model's controller.")
+@options.time_limit("Terminate an engine that has not returned after this time, s.")
+@click.option("--closed-loop", is_flag=True, help="Feed the recorded references to the model's controller.")
 @speaks
 def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, **log: Any) -> int:
-    """Replay LOG on a model and say how well it matches."""
+    """Replay LOG on a model, and report how well the motions agree."""
     from crossbody.reports.commands.replay import Ask, run_replay
 
     kind = "closed_loop" if closed_loop else "forward"
@@ -278,17 +294,22 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 
 @cli.command()
 @options.replayed
-@click.option("--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter, or delay; repeatable.")
+@click.option(
+    "--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter to fit, or delay; repeatable."
+)
 @click.option("--hold", type=int, default=2, show_default=True, help="Hold every N-th window out of the fit; 0: none.")
-@click.option("--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True)
+@click.option(
+    "--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True,
+    help="Initial states of the windows: measured, or free unknowns.",
+)  # fmt: skip
 @click.option("--stride", type=int, default=1, show_default=True, help="Compare every N-th sample.")
-@click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time of the search, s.")
-@options.time_limit("All is stopped by then, with the best so far; a run that does not come back is ended, s.")
+@click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time for the search, s.")
+@options.time_limit("Stop after this time, s, with the best values so far, and terminate a run that does not return.")
 @speaks
 def identify(
     free: tuple[str, ...], hold: int, starts: str, stride: int, budget: float, limit: float, out: Path, **log: Any
 ) -> int:
-    """Identify parameters of a model from LOG, with intervals, judged on windows that were held out."""
+    """Identify parameters of a model from LOG, with intervals, judged on held-out windows."""
     from crossbody.reports.commands.replay import Ask, run_identify
 
     return run_identify(Ask(**log), free, hold, starts, stride, budget, out, options.command(), limit)
@@ -296,18 +317,18 @@ def identify(
 
 @cli.group()
 def log() -> None:
-    """Look at logs of hardware."""
+    """Inspect hardware logs."""
 
 
 @log.command("info")
 @click.argument("path", metavar="LOG", type=options.PATH)
-@click.option("--columns", metavar="MAP", help="Column map (TOML) to check it by.")
-@click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart.")
-@click.option("--draft", is_flag=True, help="Print a draft of a column map and nothing else.")
+@click.option("--columns", metavar="MAP", help="Column map (TOML) to apply.")
+@click.option("--part", type=int, metavar="N", help="Number of the run, if the map separates several.")
+@click.option("--draft", is_flag=True, help="Print only a draft of a column map.")
 @options.memory
 @speaks
 def log_info(path: Path, columns: str | None, part: int | None, draft: bool, memory: int) -> int:
-    """Show channels, rates, gaps and ranges of LOG, what is wrong with it, and a draft of a column map."""
+    """Show channels, rates, gaps and ranges of LOG, its faults, and a draft of a column map."""
     from crossbody.reports.replay.log import info
 
     return info(path, columns, part, draft, memory)
@@ -316,14 +337,14 @@ def log_info(path: Path, columns: str | None, part: int | None, draft: bool, mem
 @cli.command()
 @speaks
 def warm() -> int:
-    """Compile ahead what runs need, on all processors."""
+    """Compile in advance what runs need, on all processors."""
     return _do("cache.warm")
 
 
 @cli.group(invoke_without_command=True)
 @click.pass_context
 def cache(context: click.Context) -> None:
-    """Show where compiled code is kept and how much it is."""
+    """Show the folder of compiled code and its size."""
     if context.invoked_subcommand is None:
         context.exit(context.invoke(cache_show))
 
@@ -331,14 +352,14 @@ def cache(context: click.Context) -> None:
 @cache.command("show")
 @speaks
 def cache_show() -> int:
-    """Show where compiled code is kept and how much it is."""
+    """Show the folder of compiled code and its size."""
     return _do("cache.show")
 
 
 @cache.command("clear")
 @speaks
 def cache_clear() -> int:
-    """Remove all compiled code; the next run compiles again."""
+    """Remove all compiled code; the next run compiles it again."""
     return _do("cache.clear")
 
 
@@ -364,12 +385,6 @@ def _obey(arguments: list[str] | None) -> int:
         return _say(error.format_message())
     except CrossbodyError as error:
         return 130 if stopping() else _say(str(error))
-    except BrokenPipeError:
-        return _enough()
-    except SystemExit:  # click's own answer to a pipe that is closed, whose streams it has wrapped
-        if type(sys.stdout).__name__.endswith("PacifyFlushWrapper"):
-            return _enough()
-        raise
     except Exception as error:
         if stopping():  # what is being imported may make an ImportError of it
             return 130
@@ -388,18 +403,12 @@ REFUSED = (
 """What the system may refuse whatever a program does, paths that a user gave among it."""
 
 
-def _enough() -> int:
-    """Whoever read what is printed has read enough: let the rest go nowhere, which is no fault."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    return 0
-
-
 def _drop_what_cannot_be_printed() -> None:
     """Let what waits for a full disk go nowhere: the end of the process would try it again."""
     try:
         sys.stdout.flush()
     except OSError:
-        _enough()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _say(text: str, code: int = 2) -> int:

@@ -30,8 +30,8 @@ def speaks(command: _Work) -> _Work:
         return command(*args, **more)
 
     options = (
-        click.option("--quiet", "-q", is_flag=True, help="Print nothing but what is wrong; no progress."),
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON and nothing else."),
+        click.option("--quiet", "-q", is_flag=True, help="Print errors and failures only, and no progress."),
+        click.option("--json", "as_json", is_flag=True, help="Print only the result, as JSON."),
     )
     told: Any = spoken
     for option in options:

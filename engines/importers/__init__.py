@@ -34,7 +34,7 @@ SECONDS, BYTES = 20.0, 3 << 30
 """What an importer may take: time, s, and memory, bytes."""
 GRACE = 2.0
 """What it has in any case when its job is there, s: it may have waited for that."""
-LATE = "It did not come back within"
+LATE = "It did not return within"
 """How the sentence on an importer begins that took more than its time."""
 TOLD = 100_000
 """Bytes of what an importer says that are read."""

@@ -92,7 +92,7 @@ class Mujoco(Engine):
     profiles: Mapping[str, str] = {
         "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events",
         "default": "the obvious model: contact constants, integrator (Euler) and step (2 ms) as MuJoCo sets them",
-        "as_is": "a robot file as it stands: its own step, integrator, solref, solimp and cone",
+        "as_is": "an unchanged robot file: its own step, integrator, solref, solimp and cone",
     }
     of_scenes: Mapping[str, str] = {"default": "as_is"}
     versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
@@ -116,7 +116,7 @@ class Mujoco(Engine):
             return refused
         case = on_scene(case)
         if profile == "as_is" and case.scene is None:
-            return f"The profile as_is runs a robot file as it stands, and {case.name} is none; its own is default."
+            return f"The profile as_is runs unchanged robot files, and {case.name} is not one; use the profile default."
         if (name := module_of(case)) in MECHANISMS.names():
             own = getattr(MECHANISMS.load(name), "why_not", None)
             return own(case, profile) if own else None

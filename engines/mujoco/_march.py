@@ -70,7 +70,8 @@ class March:
         for instant in instants:
             if not self._until(instant) or not self._change(instant):
                 return
-            self.now = self._settled(self.now)
+            before, self.now = self.now, self._settled(self.now)
+            self.tape.switch(instant, before, self.now)  # an input that jumps may open or close a row
             self.tape.record(scene.lam(), self.now)
         self._until(t_end)
 

@@ -167,11 +167,13 @@ class Rows:
 
     def _rubbing(self) -> Sequence[Rub]:
         """Return the contacts with friction that MuJoCo has now, also of pairs whose coefficient is 0: it has 1e-5."""
-        if not self.rubbing:
-            return ()
+        return self.rubs.at(self._met) if self.rubbing else ()
+
+    def _met(self) -> dict[int, tuple[Contact, int]]:
+        """Return which of MuJoCo's contacts have friction now, and of each the scene's contact and its row."""
         there = zip(self.data.contact.dim.tolist(), self.data.contact.efc_address.tolist(), strict=True)
         known = [i for i, (dim, first) in enumerate(there) if dim > 1 and first >= 0 and self._geoms(i) in self.touches]
-        return self.rubs.at({i: (self.touches[self._geoms(i)][0], self._touch(i)) for i in known})
+        return {i: (self.touches[self._geoms(i)][0], self._touch(i)) for i in known}
 
     def jacobian(self) -> Floats:
         """Return H (nc, nv); 0 of a row that is not there."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -53,15 +53,15 @@ class Rubs:
     tangents: Mapping[int, int]
     _known: tuple[tuple[float, bytes], Sequence[Rub]] = field(default=((-1.0, b""), ()))
 
-    def at(self, rows: Mapping[int, tuple[Contact, int]]) -> Sequence[Rub]:
+    def at(self, rows: Callable[[], Mapping[int, tuple[Contact, int]]]) -> Sequence[Rub]:
         """Return those that MuJoCo has now; of one state it is asked for forces and for modes.
 
         Args:
-            rows: of contacts in MuJoCo's list, which of the scene's each is, and its row.
+            rows: gives, of contacts in MuJoCo's list, which of the scene's each is, and its row.
         """
         now = self.data.time, self.data.efc_force.tobytes()
         if self._known[0] != now:
-            self._known = now, list(self._found(rows))
+            self._known = now, list(self._found(rows()))
         return self._known[1]
 
     def _found(self, rows: Mapping[int, tuple[Contact, int]]) -> Iterator[Rub]:

@@ -92,7 +92,7 @@ def why_not(case: Case, profile: str) -> str | None:
     if profile != "as_is":
         return None
     if not case.file:
-        return "There is no file to run as it stands; what MuJoCo makes of a scene by itself is the profile default."
+        return "There is no file to run unchanged; for MuJoCo's own contacts, use the profile default."
     try:
         _from_file(case)
     except SceneError as error:

@@ -274,7 +274,7 @@ class Gaps:
             return self.gradients(q)
         if not self.own:
             return self.touching.gradients(q, chosen)
-        wanted = np.array(chosen)
+        wanted = np.array(chosen, dtype=np.intp)  # of no row too
         before = wanted < self.own
         if before.all():
             h, H = self._own(q)

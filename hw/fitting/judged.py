@@ -259,7 +259,7 @@ def _about(e: Estimate, i: int, fit: Fit, active: bool, flat: Mapping[int, str])
     for j in range(i):
         if abs(fit.correlation[i, j]) > TOGETHER:
             other = fit.estimates[j].name
-            yield f"{e.name} and {other} can hardly be told apart (correlation {fit.correlation[i, j]:+.4f})."
+            yield f"{e.name} and {other} can hardly be separated (correlation {fit.correlation[i, j]:+.4f})."
 
 
 def _differ(one: Agreement) -> str:

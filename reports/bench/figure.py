@@ -6,21 +6,23 @@ import math
 
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
+from crossbody.reports.figures.panels import Panels
+from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES
 
 APART = 1.0
 """Decades of error between two labels of a line, twice the decades of time."""
 
 
-def work_precision(rows: pd.DataFrame) -> go.Figure:
+def work_precision(rows: pd.DataFrame) -> Figure:
     """Log-log lines labelled with tolerance or step; a failed run is a cross at the right edge.
 
     Args:
         rows: as `crossbody.reports.bench.measure.bench` gives them.
     """
-    figure = go.Figure()
+    cases = ", ".join(rows["case"].unique())
+    panels = Panels(f"Work against precision, {cases}; a cross is a run that failed", 560)
     error = rows["error"].astype(float)
     finite = error[np.isfinite(error) & (error > 0.0)]
     edge = 10.0 * float(finite.max()) if len(finite) else 1.0
@@ -29,22 +31,18 @@ def work_precision(rows: pd.DataFrame) -> go.Figure:
         failed = ~np.isfinite(group["error"].astype(float))
         x = group["error"].astype(float).where(~failed, edge).clip(lower=floor)
         label = f"{engine}:{profile}" if rows["case"].nunique() == 1 else f"{case} {engine}:{profile}"
-        figure.add_trace(
-            go.Scatter(
-                x=x, y=group["median_ms"], name=label, mode="lines+markers+text",
-                text=_labels(x, group["median_ms"], group["setting"]),
-                customdata=group["setting"], hovertemplate="%{customdata:.0e}: error %{x:.2g}, %{y:.3g} ms",
-                textposition="top center", textfont={"size": 9},
-                line={"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)]},
-                marker={"symbol": np.where(failed, "x", "circle").tolist(), "size": 8},
-                error_y={"type": "data", "array": (group["iqr_ms"] / 2).tolist(), "thickness": 1},
-            )
+        panels.add(
+            x=x, y=group["median_ms"], name=label, mode="lines+markers+text",
+            text=_labels(x, group["median_ms"], group["setting"]),
+            customdata=group["setting"], hovertemplate="%{customdata:.0e}: error %{x:.2g}, %{y:.3g} ms",
+            textposition="top center", textfont={"size": 9},
+            line={"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)]},
+            marker={"symbol": np.where(failed, "x", "circle"), "size": 8},
+            error_y={"type": "data", "array": group["iqr_ms"] / 2, "thickness": 1},
         )  # fmt: skip
-    figure.update_xaxes(type="log", title_text="relative error of position and event times", exponentformat="power")
-    figure.update_yaxes(type="log", title_text="run time, median [ms]", exponentformat="power")
-    cases = ", ".join(rows["case"].unique())
-    figure.update_layout(title_text=f"Work against precision, {cases}; a cross is a run that failed", height=560)
-    return figure
+    panels.axes("x", type="log", title="relative error of position and event times", exponentformat="power")
+    panels.axes("y", type="log", title="run time, median [ms]", exponentformat="power")
+    return panels.figure()
 
 
 def _labels(x: pd.Series, y: pd.Series, setting: pd.Series) -> list[str]:

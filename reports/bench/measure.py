@@ -18,13 +18,14 @@ import numpy as np
 import pandas as pd
 
 from crossbody import engines
-from crossbody.cases import Case, CaseUnsupported, Trajectory
+from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Trajectory
 from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
+from crossbody.reports.judging.comparison import crash
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import watch
-from crossbody.reports.runs.jobs import Pick, of_case
+from crossbody.reports.runs.jobs import Pick, of_case, of_start
 
 COLUMNS = (
     "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "touches",
@@ -52,6 +53,7 @@ class Rung:
     promised: float
     between: float
     interpreted: str
+    crashed: str = ""
     inner: list[float] = field(default_factory=list)
     call: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
@@ -88,16 +90,27 @@ def _climbed(case: Case, pick: Pick, effort: Effort, truths: Truths) -> Iterator
     rungs = Ladder(case, pick, effort)
     for knob, setting, run in rungs:
         began = time.perf_counter()
-        first = run.run()
+        first, crashed = _first(case, pick, run)
         took = time.perf_counter() - began
         rungs.climbed(took, first.steps)
         against, truth = truths.of(run)
         off = errors(truth, first, case)
         shown = between(case, pick, run, first, truth) if math.isfinite(off["error"]) else math.inf
-        rung = Rung(pick, against, truth, knob, setting, run, first, off, promised, shown, python)
-        if took > effort.slow:
+        rung = Rung(pick, against, truth, knob, setting, run, first, off, promised, shown, python, crashed)
+        if took > effort.slow or crashed:
             rung.note(first, took, 1.0)
         yield rung
+
+
+def _first(case: Case, pick: Pick, run: Any) -> tuple[Trajectory, str]:
+    """The warm-up of a rung, and what it threw: the lines of the others are measured all the same."""
+    try:
+        return run.run(), ""
+    except CrossbodyError:  # wrong use of ours
+        raise
+    except Exception as error:
+        crashed = crash(error)
+        return of_start(case, crashed), crashed
 
 
 def _timed(rung: Rung) -> None:
@@ -162,11 +175,12 @@ def _row(case: Case, rung: Rung) -> dict[str, Any]:
         "error_between": rung.between,
         "honesty": rung.errors["error"] / rung.setting if rung.knob == "rtol" else math.nan,
         "median_ms": median, "iqr_ms": high - low, "call_ms": 1e3 * float(np.median(rung.call)),
-        "native_ms": 1e3 * min(rung.run.native() for _ in range(NATIVE)),
+        "native_ms": math.nan if rung.crashed else 1e3 * min(rung.run.native() for _ in range(NATIVE)),
         "control_ms": 1e3 * float(np.median(rung.control)),
         "interpreted": rung.interpreted,
         "cores": float(np.median(rung.cpu)), "repeats": len(rung.call), "steps": rung.first.steps,
-        "outcome": rung.first.outcome.value, "promised": rung.promised,
+        "outcome": f"crashed: {rung.crashed}" if rung.crashed else rung.first.outcome.value,
+        "promised": rung.promised,
     }  # fmt: skip
 
 

@@ -35,7 +35,7 @@ class _Positive(click.FloatRange):
         """Read a number."""
         found = super().convert(value, param, ctx)
         if math.isnan(found):
-            self.fail(f"{value} is no number.", param, ctx)
+            self.fail(f"{value} is not a number.", param, ctx)
         return found
 
 
@@ -60,20 +60,20 @@ readers = click.option(
     "--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given."
 )
 variant = click.option(
-    "--variant", "--key", metavar="V", help="Variant of the case, keyframe of a robot's file; all if not given."
+    "--variant", "--key", metavar="V", help="Variant of the case, or keyframe of a robot file; all if not given."
 )
 against = click.option(
-    "--against", type=PATH, metavar="BASE", help="Folder of an earlier run: the index says what has changed."
+    "--against", type=PATH, metavar="BASE", help="Folder of an earlier run: the index shows what has changed."
 )
 others = click.option(
     "--with", "others", type=PATH, metavar="DIR", multiple=True,
-    help="Folder of a study (bench, stress, gapmap, ...): its pages stand beside; repeatable.",
+    help="Folder of a study (bench, stress, gapmap, ...) to include in the report; repeatable.",
 )  # fmt: skip
-reader_limit = time_limit("A reader that has not come back by then is ended, s.", 20.0)
-engine_limit = time_limit("An engine that has not come back from a case by then is ended, s; compilation counts.")
+reader_limit = time_limit("Terminate a reader that has not returned after this time, s.", 20.0)
+engine_limit = time_limit("Terminate an engine that has not finished a case after this time, s, with compilation.")
 memory = click.option(
     "--memory", type=click.IntRange(1), default=1000, show_default=True, metavar="MB",
-    help="That reading LOG may take over its own size; a file that unfolds to more is refused.",
+    help="Memory for reading LOG, beyond its size; a file that decompresses to more is refused.",
 )  # fmt: skip
 
 
@@ -98,19 +98,19 @@ def parameters(command: _Work) -> _Work:
         taking,
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
         click.option("--t-end", type=float, metavar="S", help="Horizon, s; as --set t_end=S."),
-        click.option("--law", metavar="a0=,a1=", help="Constants of the rows; as --set for each of them."),
-        click.option("--ctrl", metavar="FILE", help="Of a robot's file: table of controls (CSV, Parquet, NPZ)."),
+        click.option("--law", metavar="a0=,a1=", help="Constants of all rows; as --set for each constant."),
+        click.option("--ctrl", metavar="FILE", help="Robot file: table of controls (CSV, Parquet, NPZ)."),
         click.option(
             "--control", metavar="FILE.py:NAME",
-            help="Of a robot's file: a callable (t, q, v) -> u of your own, or a class of such.",
+            help="Robot file: your own callable (t, q, v) -> u, or a class of such callables.",
         ),
-        click.option("--tick", type=float, metavar="S", help="Between two calls of it, s; 1e-3 if not given."),
+        click.option("--tick", type=float, metavar="S", help="Time between calls of --control, s; 1e-3 if not given."),
         click.option(
             "--push", type=(str, *(float,) * 5), multiple=True, metavar="BODY FX FY FZ T0 T1",
-            help="Of a robot's file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
+            help="Robot file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
         ),
-        click.option("--without", metavar="PARTS", help="Of a robot's file: parts to leave out of every engine."),
-        click.option("--rank", type=int, metavar="N", help="Of a robot's file: how many rows of its loops hold."),
+        click.option("--without", metavar="PARTS", help="Robot file: parts to leave out in every engine."),
+        click.option("--rank", type=int, metavar="N", help="Robot file: number of independent rows of its loops."),
     )  # fmt: skip
     return found
 
@@ -127,15 +127,15 @@ def replayed(command: _Work) -> _Work:
         click.argument("path", metavar="LOG", type=PATH),
         click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them."),
         click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
-        click.option("--part", type=int, metavar="N", help="Number of the run, where the map tells several apart."),
+        click.option("--part", type=int, metavar="N", help="Number of the run, if the map separates several."),
         click.option(
             "--repair", metavar="R", multiple=True, help="fill_dropped, drop_duplicates or unwrap; repeatable."
         ),
         memory,
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the model; repeatable."),
         click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
-        click.option("--horizon", type=float, metavar="S", help="Length of a window, s, if not to the next restart."),
-        click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of what was measured, s."),
+        click.option("--horizon", type=float, metavar="S", help="Length of a window, s; if not to the next restart."),
+        click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of the measurement, s."),
         click.option(
             "--limit", "limits", metavar="NAME=V", multiple=True,
             help="Limit on a metric, for example fit=90 or rmse_th1=0.01; repeatable.",

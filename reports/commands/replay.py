@@ -85,7 +85,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
     given = limits.parse(ask.limits)
     engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
     if not engines:
-        raise CaseUnsupported(f"No engine that was asked for has come back: {'; '.join(watch.all_lost())}.")
+        raise CaseUnsupported(f"None of the requested engines returned: {'; '.join(watch.all_lost())}.")
     log = ask.log()
     with Parts(out, command, _identity(ask, log, kind, wanted)) as parts, voice.progress(len(engines)) as bar:
 

@@ -6,15 +6,17 @@ import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 
 import click
 
 from crossbody.cases import Case, InvalidValue, installed
 from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports import voice
-from crossbody.reports.commands.run_shown import counted, show
+from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging.audit import SEED
+from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Row, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results, site
@@ -28,13 +30,14 @@ from crossbody.reports.voice import progress
 def run(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
     rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
-    limit: float = LIMIT, strict: bool = False, at_once: int = 1,
+    limit: float = LIMIT, strict: bool = False, at_once: int = 1, budget: float = BUDGET,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
     `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one;
     `limit` is the time that an engine may take for one case, s; `strict` makes a number wrong that left its
-    regression band; `at_once` is how many cases are run at once, in processes of their own.
+    regression band; `at_once` is how many cases are run at once, in processes of their own; `budget` is how long the
+    tightest run of a scene may take, s.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
@@ -49,12 +52,15 @@ def run(
     output.check(out, "run")
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
-    with Parts(out, command, identity("run", cases, names, picks=picks, rtol=rtol, settings=asked)) as parts:
+    clock = [perf_counter()]
+    decides = identity("run", cases, names, picks=picks, rtol=rtol, settings=asked, budget=budget)
+    with Parts(out, command, decides) as parts:
 
         def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
-            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit)
+            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit, budget=budget)
+            again = pairs if result.case.t_end == cases[i].t_end else (*pairs, f"t_end={result.case.t_end:g}")
             with parts.put(key(i, cases[i])) as made:
-                rows = study.write_case(made, result, repeat(cases[i], names, pairs, rtol, settings))
+                rows = study.write_case(made, result, repeat(cases[i], names, again, rtol, settings))
             if len(cases) > 1:
                 voice.note(f"{cases[i].label}: {counted(rows)}")
             return 0
@@ -63,13 +69,17 @@ def run(
         with progress(len(cases) * (len(picks) + 1)) as tell:
             for i in _missing(cases, parts):
                 do(i, tell)
+        clock.append(perf_counter())
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
             # Pages take longer than all but the engines: what they show is told before them, and lost by nothing.
             untold = _tell(rows, made, controlled=any(case.control is not None for case in cases))
+            clock.append(perf_counter())
             site.write(made, against=against, others=others)
     if untold is not None:
         raise untold
+    if not voice.silent():
+        show_time([*clock, perf_counter()], results.times_of(out))
     where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))

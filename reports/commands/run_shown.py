@@ -7,6 +7,7 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import click
 
@@ -51,6 +52,26 @@ def show(rows: Sequence[Row], times: Times) -> None:
         click.echo("".join(f"{text}\n" for text in _absent(runs)), nl=False)
 
 
+def show_time(clock: Sequence[float], times: Times) -> None:
+    """Print where the time of the command went.
+
+    Args:
+        clock: when runs, verdicts and pages began, and when all ended, s.
+        times: of every run; those of cases at once, or of an earlier attempt, are no parts of this time.
+    """
+    spent: dict[str, float] = {}
+    for (_, who), (_, whole) in times.items():
+        spent[who.partition(":")[0]] = spent.get(who.partition(":")[0], 0.0) + (whole or 0.0)
+    runs, verdicts, pages = (later - earlier for earlier, later in pairwise(clock))
+    parts = [
+        f"{who} {seconds:.1f}" for who, seconds in sorted(spent.items(), key=lambda one: -one[1]) if seconds >= 0.05
+    ]
+    rest = runs - sum(spent.values())
+    told = f" ({', '.join([*parts, f'truths {rest:.1f}'])})" if parts and rest >= 0.0 else ""
+    total = clock[-1] - clock[0]
+    click.echo(f"Time: {total:.1f} s: runs {runs:.1f}{told}, verdicts {verdicts:.1f}, pages {pages:.1f}")
+
+
 def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
     """Lay out a line a run below the name of its case; columns that say nothing, or do not fit, are left out."""
     runs = [run for run in runs if (run.label, run.who) in times or not run.skipped]
@@ -70,7 +91,10 @@ def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
     for i, run in enumerate(runs):
         if i == 0 or run.label != runs[i - 1].label:
             lines.append(click.style(run.label, bold=True))
-        lines.append(f"  {run.who:<{first - 2}}" + "".join(_cell(head, cells, i) for head, cells in columns.items()))
+        lines.append(
+            f"  {run.who.removesuffix(':'):<{first - 2}}"
+            + "".join(_cell(head, cells, i) for head, cells in columns.items())
+        )
     return "\n".join(lines)
 
 
@@ -102,7 +126,7 @@ def _wrong(run: EngineRun, row: Row) -> str:
 def _lost(run: EngineRun, row: Row) -> str:
     expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
     value = f"{abs(row['value'] - expected):.4g}{_unit(row)} from what is claimed, band {row['band']:.3g}"
-    return f"more than a stored run gave: {run.label} {run.who} {row['metric']} {value}"
+    return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"
 
 
 def _unit(row: Row) -> str:

@@ -5,14 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 if TYPE_CHECKING:
     import pandas as pd
-    import plotly.graph_objects as go
 
-Figure: TypeAlias = "go.Figure | dict[str, Any]"
-"""A figure of plotly, or its data and layout as plain values, which is many times faster."""
+
+class Written(Protocol):
+    """A figure of the package plotly, which writes itself as JSON."""
+
+    def to_json(self, *, engine: str) -> str:
+        """Return data and layout."""
+
+
+Figure: TypeAlias = dict[str, Any]
+"""Data and layout as plain values for plotly.js, of traces in x and y (its bundle `cartesian`)."""
 
 
 class Kind(StrEnum):
@@ -70,7 +77,7 @@ class Plot:
     """
 
     name: str
-    figure: Figure
+    figure: Figure | Written
     time: bool = False
 
 

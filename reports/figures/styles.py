@@ -12,6 +12,8 @@ COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8
 DASHES = ("solid", "dash", "dot", "dashdot")
 STROKES = {"solid": "none", "dash": "7 4", "dot": "2 3", "dashdot": "7 3 2 3"}
 """The same dashes as lengths, for what plotly does not draw."""
+LEVEL = "#8a8a8a"
+"""Of limits and zero lines: seen on light and on dark pages."""
 
 
 def label(trace: Trace) -> str:

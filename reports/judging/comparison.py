@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
+    "slip_times", "stick_times", "friction_impulse", "friction_work",
     "largest position (importer)", "largest event_times (importer)",
 })  # fmt: skip
 """Metrics that compare a motion with the truth's, or those of two readers of a file: rounding grows as the motion has
@@ -177,11 +178,14 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     told.append(f"{truth.source}.")
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
+    if truth.part < 1.0:
+        asked = case.t_end / truth.part
+        told.append(f"Followed to {case.t_end:.4g} s of {asked:.4g} s: more takes longer than --budget allows.")
     return [Verdict(
         case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",
         limit=truth.allowed, tier=truth.tier.value, why=" ".join(told), command=command,
         verdict=Word.WITHIN if value <= truth.allowed and not short else Word.OUTSIDE,
-        compared=min(truth.trusted / case.t_end, 1.0),
+        compared=truth.part * min(truth.trusted / case.t_end, 1.0),
     )]  # fmt: skip
 
 

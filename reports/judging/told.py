@@ -81,20 +81,21 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     all_ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
     ran = [run for run in all_ran if run.judged]
     if all_ran and not ran and not any(run.wrong for run in runs):  # a truth may be outside by itself
-        return "Nothing is judged here: no number has a limit."
+        return "Nothing is judged, since no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
     right = [run for run in ran if not run.wrong]
     known = [run.who for run in right if run.deviates]
     beyond = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
     text = f"{len(right) - len(known) - len(beyond)} of {len(ran)} runs are within all limits"
-    text += f", {len(known)} deviate as is known of them ({', '.join(dict.fromkeys(known))})." if known else "."
+    verb = "deviates" if len(known) == 1 else "deviate"
+    text += f", {len(known)} {verb} as expected ({', '.join(dict.fromkeys(known))})." if known else "."
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     if off:
         text += f" Off: {_named([_off(run, run.wrong[0]) for run in off])}."
     if beyond:
         beyond.sort(key=lambda one: -share(one[1]))
-        text += f" Off by a known cause, with no bound on how far: {_named([_off(*one) for one in beyond])}."
+        text += f" Off by a known cause without a bound: {_named([_off(*one) for one in beyond])}."
     short = [(run.label, row) for run in runs for row in run.rows if row["metric"] == TRUTH and row["compared"] < 1.0]
     if short:
         text += f" Compared as far as the truth is known: {_named([f'{at}, {_part(row)}' for at, row in short])}."

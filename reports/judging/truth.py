@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from time import process_time
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,25 +16,18 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reports.judging.answers import Answers
+from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, tight
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, before, sample_times, shortened
 
-if TYPE_CHECKING:
-    from crossbody.engines import Run
-
 SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 WITNESS = 100.0
 """Tolerance of the witness that shares nothing but the scene, likewise: a run in Python, whose steps cost 1e3 more."""
-WITNESS_S, SHARE = 40.0, 0.05
-"""Time that this witness may take, s, by what it takes for the first part of the horizon, and that part."""
-COARSE, LEAST, MANY = 1e-9, 50, 20
-"""A scene is followed so tightly as takes up to so many times the steps of a coarse run, or of the least that counts:
-of a method of order 8 the tightest takes 3 times as many, unless rounding is what its errors are made of."""
-LADDER = (1.0, 10.0)
-"""Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
+OF_WITNESS, SHARE = 8.0, 0.05
+"""Time that this witness may take, in budgets, by what it takes for the first part of the horizon, and that part."""
 NUDGE, DIRECTIONS, INSTANTS = 1e-7, 2, 201
 """By how much of the largest velocity a start is put off, in how many directions, and when it is looked at."""
 PARTED = 1e-6
@@ -50,21 +43,28 @@ GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
 
 
-def truth_of(case: Case) -> Truth:
+def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) -> Truth:
     """The best truth that a case has: its closed form, else two independent integrators that agree.
+
+    Args:
+        case: the scene.
+        known: the case as far as it is followed, where that was found before.
+        budget: time that its tightest run may take, s.
 
     Raises:
         CrossbodyError: if the reference cannot run the case.
     """
     from crossbody import engines
-    from crossbody.engines.equations import known
+    from crossbody.engines.equations import known as has_equations
 
     arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: any other truth is known by itself only.
-        case, first = tightened(case)
+        known = followed(case, budget) if known is None else known
+        case, first = known.case, known.motion
         apart = case.fsm == "level" and engines.load("reference").why_not(case, "cvode") is None
-        return _integrated(case, first, "cvode" if apart else "compiled")
+        found = _integrated(case, first, "cvode" if apart else "compiled", budget=budget)
+        return replace(found, part=known.part)
     motion = case.closed_form
     first = motion(np.zeros(1))
     truth = Truth(
@@ -75,50 +75,31 @@ def truth_of(case: Case) -> Truth:
         agreement={},
         joined=case.general,
     )
-    if "reference" not in engines.names() or not known(case):
+    if "reference" not in engines.names() or not has_equations(case):
         return truth
-    second = _tight(case)
+    second = tight(case)
     told = _held_against(truth, second, case, case.tight)
     # A closed form is not cut short by what is held against it.
     return replace(told, trusted=math.inf, parted=math.inf, agreement=_agreement(truth, second, case))
 
 
-def law_of(followed: Case) -> Truth | None:
+def law_of(case: Case) -> Truth | None:
     """The truth of the equations that an engine really integrates, where they are not the case's own (spec 4.1).
 
     Against it an engine has a step error alone. It is known by the reference itself (tier D).
 
     Args:
-        followed: the case with the engine's machine and collision rule (`follows` of its run).
+        case: with the engine's machine and collision rule (`follows` of its run).
 
     Returns:
         None where the reference does not reach the horizon: the engine is then judged against itself.
     """
-    first = _tight(followed)
+    first = tight(case)
     if not first.outcome.ok:
         return None
-    found = _integrated(followed, first, "compiled")
-    rule = f"the equations that the engine follows (machine {followed.fsm}, collisions {followed.collisions}): "
+    found = _integrated(case, first, "compiled")
+    rule = f"the equations that the engine follows (machine {case.fsm}, collisions {case.collisions}): "
     return replace(found, source=rule + found.source)
-
-
-def tightened(case: Case) -> tuple[Case, Trajectory]:
-    """Return a scene with the tightest tolerance that rounding leaves it, and its motion there.
-
-    Stiff rows on small masses reach theirs before.
-    """
-    if not case.general:
-        return case, _tight(case)
-    from crossbody.engines import load
-
-    coarse = _motion(load("reference").prepare(case, "compiled", rtol=COARSE))
-    most = MANY * max(coarse.steps, LEAST)
-    for followed in (replace(case, tight=times * case.tight) for times in LADDER):
-        motion = _tight(followed, max_steps=most)
-        if motion.outcome is not Outcome.STEP_LIMIT:
-            return followed, motion
-    last = replace(case, tight=10.0 * LADDER[-1] * case.tight)
-    return last, _tight(last)
 
 
 def _motion(prepared: Any) -> Trajectory:
@@ -127,14 +108,7 @@ def _motion(prepared: Any) -> Trajectory:
     return run
 
 
-def _tight(case: Case, **bound: int) -> Trajectory:
-    """The compiled integrator at the case's tightest tolerance."""
-    from crossbody.engines import load
-
-    return load("reference").prepare(case, "compiled", rtol=case.tight, **bound).run()
-
-
-def _integrated(case: Case, first: Trajectory, other: str, why: str = "") -> Truth:
+def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget: float = BUDGET) -> Truth:
     """The compiled integrator at its tightest, held against another solver: tier C if that is independent, else D."""
     from crossbody.cases.scene_contacts import frictional
     from crossbody.engines import load
@@ -153,12 +127,15 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "") -> Tru
     rubs = tier is Tier.C and case.scene is not None and frictional(case.scene) is not None
     who, loose = other, SECOND * case.tight
     shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
-    second = _witness(case) if case.general and tier is Tier.C and not rubs else None
+    second = _witness(case, OF_WITNESS * budget) if case.general and tier is Tier.C and not rubs else None
     if isinstance(second, Trajectory):
         who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "the scene alone"
     else:
         why = f" ({second})" if second else why
-        found = _in_time(case, loose, first.outcome) if rubs else reference.prepare(case, other, rtol=loose).run()
+        limit = OF_WITNESS * budget if case.general and tier is Tier.C else math.inf
+        found = _in_time(case, other, loose, limit)
+        if rubs and isinstance(found, Trajectory) and not (found.outcome.ok or found.outcome is first.outcome):
+            found = f"CVODE ends {found.outcome.value} at t = {found.t[-1]:.4g} s"
         if isinstance(found, str):
             return _integrated(case, first, "compiled", f" ({found})")
         second = found
@@ -181,22 +158,20 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "") -> Tru
     return _rechecked(replace(truth, source=source), case)
 
 
-def _in_time(case: Case, rtol: float, expected: Outcome) -> Trajectory | str:
-    """A scene's motion with friction by CVODE, or why there is none: its equations are in Python."""
+def _in_time(case: Case, solver: str, rtol: float, limit: float) -> Trajectory | str:
+    """A motion by another solver of the reference, or that it would take longer, s: CVODE's equations are in Python."""
     from crossbody.engines import load
 
-    late = f"CVODE would share the equations alone, and take more than {WITNESS_S:.0f} s"
-    for part in (SHARE, 1.0):
+    for part in (SHARE, 1.0) if math.isfinite(limit) else (1.0,):
         shorter = replace(case, t_end=part * case.t_end)
-        run = load("reference").prepare(shorter, "cvode", rtol=rtol, time_limit=part * WITNESS_S).run()
+        bound = {"time_limit": part * limit} if math.isfinite(limit) else {}
+        run = load("reference").prepare(shorter, solver, rtol=rtol, **bound).run()
         if run.outcome is Outcome.TIME_LIMIT:
-            return late
-        if not run.outcome.ok and run.outcome is not expected:
-            return f"CVODE ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
+            return f"CVODE would share the equations alone, and take more than {limit:.0f} s"
     return run
 
 
-def _witness(case: Case) -> Trajectory | str:
+def _witness(case: Case, limit: float) -> Trajectory | str:
     """A scene's motion in Pinocchio, or the reason why there is none.
 
     Its model is built from the scene; kinematics, forces, rows, location of events and integrator are others' or
@@ -206,23 +181,16 @@ def _witness(case: Case) -> Trajectory | str:
 
     try:
         pinocchio = engines.load("pinocchio")
-        part, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
-        cost, steps = seconds(pinocchio.prepare(part, "law", rtol=rtol))
-        if cost > SHARE * WITNESS_S:
-            return f"Pinocchio would share the scene alone, and take about {cost / SHARE:.0f} s"
-        most = max(1000, int(WITNESS_S * steps / cost))  # contacts later on may want far more steps than the first part
+        first, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
+        cost, steps = estimated(partial(pinocchio.prepare, first, "law", rtol=rtol), SHARE, limit)
+        if cost > limit:
+            return f"Pinocchio would share the scene alone, and take about {cost:.0f} s"
+        # Contacts later on may want far more steps than the first part.
+        most = max(1000, int(limit * steps / (SHARE * cost)))
         run = pinocchio.prepare(case, "law", rtol=rtol, max_steps=most).run()
     except (EngineUnavailable, CaseUnsupported) as error:
         return str(error).removesuffix(".")
     return run if run.outcome.ok else f"Pinocchio ends {run.outcome.value} at t = {run.t[-1]:.4g} s"
-
-
-def seconds(run: Run) -> tuple[float, int]:
-    """Return the time that a run takes of one processor, s, without that of choosing its method, and its steps."""
-    began = process_time()
-    found = run.run()
-    used, tried = (found.counts.get(name, 0) for name in ("rhs", "tried"))
-    return (process_time() - began) * used / max(used + tried, 1) if tried else process_time() - began, found.steps
 
 
 def _rechecked(truth: Truth, case: Case) -> Truth:

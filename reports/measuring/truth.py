@@ -39,6 +39,7 @@ class Truth:
         growth: rate at which the two part, 1/s; NaN unless they do.
         grows: how many times more than in free flight an error of the start grows; 1 where it was not measured.
         tight: tolerance of the compiled run; NaN of another source.
+        part: of the horizon that was asked for, where the motion is followed no further for the time that it takes.
         horizon: up to when a scene's motion can be known, and why no further, as measured; None if to the end.
         joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
             each other and rest unloaded.
@@ -56,6 +57,7 @@ class Truth:
     growth: float = math.nan
     tight: float = math.nan
     grows: float = 1.0
+    part: float = 1.0
     horizon: Chaos | None = None
     joined: bool = False
 

@@ -85,7 +85,7 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
     floors = _floors(traces, [unit for _, unit in names])
     shown = drawn(len(names))
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
-    sheet = Sheet(rows, "Coordinates, and |difference to the truth|, impacts matched", points, group=2)
+    sheet = Sheet(rows, "Coordinates, and |difference from the truth|, impacts matched", points, group=2)
     for i, trace in enumerate(traces):
         t, q = filled(trace.run, trace.quaternions)
         for place, k in enumerate(shown):
@@ -106,10 +106,11 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
 def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
-    shown = drawn(len(contacts))
+    bearing = carrying(traces)
+    shown = [bearing[k] for k in drawn(len(bearing))]
     each = ("lam {}\n[N]", "impulse\n[N s]", "|error|\n[N s]")
     rows = [text.format(contacts[k]) for k in shown for text in each]
-    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference to the truth|", points, group=3)
+    sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference from the truth|", points, group=3)
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
     floor = floor_of(summed[0])
     true = [None if trace.truth is None else with_collisions(trace.truth, traces[0].run.events) for trace in traces]
@@ -122,23 +123,34 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
             exact = true[i]
             if exact is not None:
                 sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor))
-        _clip(sheet, 3 * place, traces, k)
+        ends, far = robust(traces, k)
+        if ends is not None:
+            sheet.clip(3 * place, *ends)
+            sheet.say(far)
         for limit, name in limits.get("lam_impulse_path", {}).items():
             sheet.limit(3 * place + 2, limit * float(np.nanmax(np.abs(summed[0]), initial=0.0)), name)
     sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
 
 
-def _clip(sheet: Sheet, row: int, traces: Sequence[Trace], k: int) -> None:
-    """Leave what is far beyond the truth's force off the plot, and name it."""
+def carrying(traces: Sequence[Trace]) -> list[int]:
+    """Contacts that carry a force in any motion."""
+    return sorted(
+        {int(k) for trace in traces for k in np.flatnonzero((np.nan_to_num(trace.run.lam) != 0.0).any(axis=0))}
+    )
+
+
+def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, str]:
+    """Return the ends of a plot of one contact's force where some run goes far beyond the truth's, and which."""
     ends = {label(trace): (np.nanmin(lam), np.nanmax(lam)) for trace in traces
             if np.isfinite(lam := trace.run.lam[:, k]).any()}  # fmt: skip
     low, high = ends.get(TRUTH, (0.0, 0.0))
     reach = max(high, -low)
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
-    if reach > 0.0 and far:
-        sheet.clip(row, BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach))
-        sheet.say(", ".join(f"{who} reaches {size:.2g} N" for who, size in far.items()))
+    if not far or reach == 0.0:
+        return None, ""
+    told = ", ".join(f"{who} reaches {size:.2g} N" for who, size in far.items())
+    return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), told
 
 
 def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
@@ -192,26 +204,35 @@ def suits(name: str, traces: Sequence[Trace]) -> bool:
     """Whether a figure has anything to show."""
     if name == "modes":
         return bool(changing(traces)[0])
-    return bool(traces[0].about["contacts"]) or name not in ("force", "penetration")
+    return name not in ("force", "penetration") or bool(
+        carrying(traces) if name == "force" else traces[0].about["contacts"]
+    )
 
 
 def note(name: str, traces: Sequence[Trace]) -> str:
     """What the reader of a figure must know."""
     listed = {"motion": "coordinates", "force": "contacts", "penetration": "contacts", "modes": "contacts"}.get(name)
     count = len(traces[0].about[listed]) if listed else 0
+    if name == "force":
+        bearing = carrying(traces)
+        idle = [f"{one}" for k, one in enumerate(traces[0].about["contacts"]) if k not in bearing]
+        count = len(bearing)
+    else:
+        idle = []
     some = f"{MOST_SIGNALS} of {count} {listed} are drawn; all are stored." if count > MOST_SIGNALS else ""
+    some += f" Without a force in every run: {', '.join(idle)}." if idle else ""
     return f"{NOTES.get(name, '')} {some}".strip()
 
 
 NOTES = {
     "motion": (
-        "Impacts are matched first and the arcs between them compared; how far impacts are off is the metric "
-        "event_times. Differences end at a common floor, the rounding of the largest value of that unit: below it "
-        "nothing is left to compare. Where a solver took long steps, a cubic through q and v of both ends is drawn."
+        "Impacts are matched first, and the arcs between them compared; the errors of their times are the metric "
+        "event_times. Differences are cut off at a common floor, the rounding error of the largest value of that unit. "
+        "Across long steps of a solver, a cubic through q and v at both ends is drawn."
     ),
     "force": (
-        "An impact that comes a little later changes lam at one instant a lot, its impulse hardly: judge by that. "
-        "Collisions that take no time are steps of the impulse."
+        "A small delay of an impact changes lam at one instant a lot, but hardly its impulse: judge by the impulse. "
+        "Instantaneous collisions are steps of the impulse."
     ),
 }
 FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int, Limits], Figure]]] = {

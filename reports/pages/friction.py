@@ -11,18 +11,17 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
-from crossbody.reports.figures.styles import label, style
+from crossbody.reports.figures.styles import LEVEL, label, style
 from crossbody.reports.figures.values import coded, plain
-from crossbody.reports.pages.sheet import LEVEL
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.scenes.scene import slip
 
 MOST = 1000
 """Points of one engine's line."""
 TEXT = (
-    "Of the contact that is pressed the most. A contact that holds is inside the cone, one that slides on its edge; "
-    "what is outside breaks Coulomb's law. In the plane of the contact friction as a part of mu lam is a point of the "
-    "unit disc; where it slides it is against the slip."
+    "For the contact with the largest load. The force of a sticking contact is inside the cone, that of a sliding one "
+    "on its edge; outside, it violates Coulomb's law. In the plane of the contact, the friction force relative to mu "
+    "lam is a point of the unit disc; a sliding contact has it opposite to the slip."
 )
 
 

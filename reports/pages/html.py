@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from crossbody.reports.figures.section import Figure, Kind, Section
+from crossbody.reports.figures.section import Column, Figure, Kind, Section, Table, Written
 from crossbody.reports.pages.packing import packed_text, packed_value
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -70,6 +70,7 @@ def environment() -> Environment:
         "number": number,
         "bounded": bounded,
         "slug": slug,
+        "told": told,
         "plot": plot,
         "text_packed": packed_text,
         "value_packed": packed_value,
@@ -97,7 +98,7 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
         return inside if single else f"{page}.html{inside if anchor else ''}"
 
     inline = {"style": _text("page.css"), "script": _script(), "plotly": _packed_plotly()} if single else {}
-    scripts = [THEME, *((_script(), _plotly()) if single else ())]
+    scripts = [THEME, *((_script(), _text(PLOTLY)) if single else ())]
     template = environment().get_template("page.html")
     return template.render(
         pages=pages, links=links, footer=footer, href=href, drawn=any(_drawn(page) for page in pages),
@@ -131,27 +132,21 @@ def policy(scripts: Sequence[str], single: bool) -> str:
 def assets(pages_drawn: bool) -> dict[str, str]:
     """The files that all pages of a folder share, by name."""
     shared = {SCRIPT: _script(), STYLE: _text("page.css")}
-    return shared | ({PLOTLY: _plotly()} if pages_drawn else {})
+    return shared | ({PLOTLY: _text(PLOTLY)} if pages_drawn else {})
 
 
 def _drawn(page: Page) -> bool:
     return any(section.plots for section in page.sections)
 
 
+@cache
 def _text(name: str) -> str:
     return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 @cache
-def _plotly() -> str:
-    from plotly.offline import get_plotlyjs
-
-    return str(get_plotlyjs())
-
-
-@cache
 def _packed_plotly() -> str:
-    return packed_text(_plotly())
+    return packed_text(_text(PLOTLY))
 
 
 @cache
@@ -159,7 +154,7 @@ def _script() -> str:
     return "\n".join(_text(name) for name in PARTS)
 
 
-def plot(figure: Figure) -> dict[str, Any]:
+def plot(figure: Figure | Written) -> dict[str, Any]:
     """A figure as plain values, with its title and height taken out of it; the page gives it its colours."""
     made: dict[str, Any] = figure if isinstance(figure, dict) else json.loads(figure.to_json(engine="json"))
     layout = {key: value for key, value in made["layout"].items() if key not in ("title", "template")}
@@ -189,6 +184,14 @@ def bounded(value: float | None, known: float | None) -> tuple[str, float]:
     """Return a sign and what a number is known to where it is below that, else nothing and the number."""
     number, limit = (math.nan if x is None else x for x in (value, known))
     return ("< ", limit) if abs(number) < limit else ("", number)
+
+
+def told(table: Table) -> list[Column]:
+    """Columns in which some row has a value; all where there are no rows."""
+    known = [row.get(column.key) for column in table.columns for row in table.rows]
+    empty = [all(v is None or v == "" or v != v for v in known[i * len(table.rows) : (i + 1) * len(table.rows)])
+             for i in range(len(table.columns))]  # fmt: skip
+    return [column for column, nothing in zip(table.columns, empty, strict=True) if not (nothing and table.rows)]
 
 
 def number(value: Any) -> str:

@@ -10,14 +10,15 @@ from crossbody.cases import Mode
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import label, style
 from crossbody.reports.figures.values import coded, plain
+from crossbody.reports.pages.figures import robust
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 
 MOST = 1500
 """Points of one engine's line."""
 TEXT = (
-    "Of the contact that carries the most: force over how deep it is. A spring is a line, damping opens it to a loop "
-    "whose area is the energy lost; what pulls stands below zero."
+    "Force over penetration depth of the contact with the largest load. A spring gives a line; damping opens it to a "
+    "loop whose area is the energy lost. A force below zero pulls."
 )
 
 
@@ -31,10 +32,12 @@ def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
         return []
     lines = [line for i, trace in enumerate(traces) if (line := _line(trace, i, k, int(share * MOST)))]
     name = traces[0].about["contacts"][k]
+    ends, far = robust(traces, k)
+    title = f"Force over depth, contact {plain(name)}{far and f'. Off scale: {far}'}"
     layout = {
-        "title": {"text": f"Force over depth, contact {plain(name)}"}, "height": 420, "showlegend": False,
+        "title": {"text": title}, "height": 420, "showlegend": False,
         "xaxis": {"title": {"text": "depth [m]"}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": "lam [N]"}, "exponentformat": "power"},
+        "yaxis": {"title": {"text": "lam [N]"}, "exponentformat": "power"} | ({"range": list(ends)} if ends else {}),
     }  # fmt: skip
     plots = (Plot(name="plot-hysteresis", figure={"data": lines, "layout": layout}),)
     return [Section(name="hysteresis", title="Force over depth", text=TEXT, plots=plots)] if lines else []

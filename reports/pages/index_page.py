@@ -66,8 +66,8 @@ def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i:
         context={
             "corner": "Case", "heads": grid.heads(shown), "lines": [_line(found, case, shown) for case in cases],
             "pages": names, "here": i, "cases": len(found.cases), "wide": False, "filtered": len(cases) > 5,
-            "says": "A cell counts the rows of its worst verdict among those judged; below: relative error of "
-            "position, run time.",
+            "says": "Each cell shows how many of its judged rows have its worst verdict, and below, the relative error "
+            "of position and the run time.",
         },
     )  # fmt: skip
 
@@ -111,7 +111,11 @@ def _tiles(found: Results) -> dict[str, Any]:
     failed = sum(row["metric"] == "audit" and row["verdict"] == Word.OUTSIDE for row in found.verdicts)
     tiles = [
         {"value": len(found.cases), "title": "cases", "word": ""},
-        {"value": len({row["who"] for row in found.verdicts}), "title": "engines with profile", "word": ""},
+        {
+            "value": len({row["who"] for row in found.verdicts if row["engine"] != TRUTH}),
+            "title": "engines with profile",
+            "word": "",
+        },
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if failed:

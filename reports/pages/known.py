@@ -12,7 +12,7 @@ from crossbody.reports.judging.verdict import Row, Word
 
 COLUMNS = columns(
     who="Engine", why=("What is known of it", Kind.LONG), metrics="Metrics", cases=("Cases", Kind.NUMBER),
-    rows=("Rows", Kind.NUMBER), most=("Farthest, times its limit", Kind.NUMBER), where="on",
+    rows=("Rows", Kind.NUMBER), most=("Farthest [limits]", Kind.NUMBER), where="On",
 )  # fmt: skip
 
 
@@ -27,7 +27,7 @@ def deviations(rows: Iterable[Row]) -> list[Section]:
     lines = [_line(who, why, mine) for (who, why), mine in sorted(found.items(), key=lambda one: one[0][0])]
     return [Section(
         name="known", title="Known deviations",
-        text="Properties of engines that are known, explained, and bounded on both sides.",
+        text="Known properties of engines, with an explanation and bounds on both sides.",
         tables=(Table(title="Known deviations", columns=COLUMNS, rows=lines),),
     )]  # fmt: skip
 

@@ -16,17 +16,17 @@ from crossbody.reports.runs.study import read_json
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")
 FLOOR = 1e-16
 RUNS = (
-    "Each engine once, at its own setting: lower left is better. An engine without a position to compare is not shown, "
-    "one that is not finite is a cross at the right edge. Whole lines over ladders of tolerances and steps: "
-    "crossbody bench, then crossbody report --with."
+    "Each engine once, at its own setting; lower left is better. An engine without a position to compare is not shown; "
+    "one whose error is not finite is a cross at the right edge. For whole lines over ladders of tolerances and steps, "
+    "run crossbody bench, then crossbody report --with."
 )
 ALL = (
-    "Every engine on every case, each at its own setting: lower left is better. A click on a name of the legend hides "
-    "that engine, a double click shows it alone."
+    "Every engine on every case, each at its own setting; lower left is better. Click a name in the legend to hide "
+    "that engine, double-click to show it alone."
 )
 LADDERS = (
-    "A line an engine, a point for every tolerance or step: lower left is better. Choose an error, then go up: the "
-    "lowest line there is the fastest engine for that accuracy."
+    "One line for each engine, with a point for every tolerance or step; lower left is better. Choose an error, then "
+    "go up: the lowest line there is the fastest engine for that accuracy."
 )
 
 
@@ -86,7 +86,8 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
     ]  # fmt: skip
     every = [one for mine in points.values() for one in mine]
     layout = {
-        "title": {"text": "Run time against error of position, a mark a case"}, "height": 460, "showlegend": True,
+        "title": {"text": "Run time against error of position, one mark for each case"}, "height": 460,
+        "showlegend": True,
         "xaxis": _decades("relative error of position", [error for _, error, _ in every]),
         "yaxis": _decades("run time [ms]", [ms for *_, ms in every]),
     }  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.reports.figures.styles import label, style
+from crossbody.reports.figures.styles import LEVEL, label, style
 from crossbody.reports.figures.values import coded, number, plain
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
@@ -21,9 +21,6 @@ EVENTS, SHARE = 40, 0.4
 TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46
 """Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one group, between groups
 (with times), pixels."""
-
-LEVEL = "#8a8a8a"
-"""Of limits: seen on light and on dark pages."""
 
 
 class Sheet:

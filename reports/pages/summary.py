@@ -11,6 +11,7 @@ from typing import Any
 
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
@@ -18,13 +19,13 @@ from crossbody.reports.runs.study import read_json
 REFERENCE = "reference:compiled"
 TEXT = (
     "A case is trusted with an engine if everything that is judged is within its limit. Errors are of position, "
-    "relative to its largest value. Run times are over those of reference:compiled for the same case, each at its own "
-    "setting and so at its own error; what the same error costs, a benchmark tells (crossbody bench, then "
-    "crossbody report --with)."
+    "relative to its largest value. Run times are relative to those of reference:compiled for the same case, each at "
+    "its own setting and therefore at its own error; for the cost of the same error, run a benchmark (crossbody bench, "
+    "then crossbody report --with)."
 )
 BENCH = (
-    "At its best error: the run time of the engine over that of the cheapest run of the reference that is at least as "
-    "accurate, median over the cases that were timed."
+    "At its best error: the run time of the engine relative to that of the cheapest run of the reference that is at "
+    "least as accurate, median over the timed cases."
 )
 COLUMNS = columns(
     who="Engine", worst=("Worst", Kind.VERDICT), within=("Cases trusted", Kind.NUMBER),
@@ -49,7 +50,7 @@ def _cells(found: Results) -> dict[str, dict[str, Sequence[Row]]]:
     """Rows of every engine and, of those, of every case."""
     cells: dict[str, dict[str, Sequence[Row]]] = {}
     for label, rows in found.rows.items():
-        for who, mine in grid.of_engine(rows).items():
+        for who, mine in grid.of_engine(row for row in rows if row["engine"] != TRUTH).items():
             cells.setdefault(who, {})[label] = mine
     return {who: cells[who] for who in grid.names({"who": who} for who in cells)}
 

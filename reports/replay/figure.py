@@ -14,6 +14,8 @@ from crossbody.reports.figures.styles import COLOURS, DASHES
 from crossbody.reports.figures.values import coded, number, plain
 
 GREY = "#888888"
+SIGNED = [[0.0, COLOURS[0]], [0.5, "#f4f4f4"], [1.0, COLOURS[3]]]
+"""Colours from -1 over 0 to 1."""
 SIGMAS = 2.0
 """Half of the noise band, standard deviations."""
 
@@ -96,7 +98,7 @@ def together(rows: pd.DataFrame) -> Figure:
     wide = rows.pivot(index="name", columns="other", values="value").loc[names, names].to_numpy(float)
     labels = [plain(name) for name in names]
     heat = {
-        "type": "heatmap", "x": labels, "y": labels, "zmin": -1.0, "zmax": 1.0, "colorscale": "RdBu", "xgap": 1,
+        "type": "heatmap", "x": labels, "y": labels, "zmin": -1.0, "zmax": 1.0, "colorscale": SIGNED, "xgap": 1,
         "ygap": 1, "z": [[None if np.isnan(x) else x for x in row] for row in wide.tolist()],
         "text": [["" if np.isnan(x) else f"{x:+.2f}" for x in row] for row in wide], "texttemplate": "%{text}",
         "colorbar": {"title": {"text": "correlation [1]"}},
@@ -105,10 +107,10 @@ def together(rows: pd.DataFrame) -> Figure:
     return {
         "data": [heat],
         "layout": {
-            "title": {"text": "Correlation of the estimates"}, "height": 160 + 40 * len(names),
-            "xaxis": {"title": {"text": "parameter [-]"}, "type": "category"},
+            "title": {"text": "Correlation of the estimates"}, "height": 180 + 60 * len(names),
+            "xaxis": {"title": {"text": "parameter [-]"}, "type": "category", "constrain": "domain"},
             "yaxis": {"title": {"text": "parameter [-]"}, "type": "category", "autorange": "reversed",
-                      "automargin": True},
+                      "automargin": True, "scaleanchor": "x", "constrain": "domain"},
         },
     }  # fmt: skip
 
@@ -177,12 +179,12 @@ def _figure(title: str, data: list[dict[str, Any]], rows: Sequence[str], below: 
         "title": {"text": title}, "height": 130 + (170 if below else 220) * len(rows), "shapes": list(shapes),
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
     }  # fmt: skip
-    room = 1.0 / len(rows)
+    tall = 1.0 / (len(rows) + (0.22 if below else 0.4) * (len(rows) - 1))
     for i, row in enumerate(rows):
-        n, low = number(i + 1), 1.0 - (i + 1) * room
-        text, inside = plain(row).replace("\n", "<br>"), low + (0.22 if below else 0.35) * room * (len(rows) > 1)
+        n, top = number(i + 1), 1.0 - i * (1.0 - tall) / max(len(rows) - 1, 1)
+        text = plain(row).replace("\n", "<br>")
         layout[f"yaxis{n}"] = {"anchor": f"x{n}", "title": {"text": text, "standoff": 14}, "exponentformat": "power",
-                               "domain": [inside, low + room]}  # fmt: skip
+                               "domain": [max(top - tall, 0.0), top]}  # fmt: skip
         layout[f"xaxis{n}"] = {"anchor": f"y{n}"} | ({"matches": "x"} if n else {})
     if below:
         layout[f"xaxis{number(len(rows))}"]["title"] = {"text": below}

@@ -13,12 +13,12 @@ from crossbody.reports.judging.verdict import Word, judge, limit_for
 HELD = "held_out_worse"
 WORSE = Limit(
     metric=HELD, value=5.0,
-    why="A fit that does worse than its start on windows that it has not seen explains the fitted ones by chance, or a "
-    "defect of the model by its parameters; what estimates scatter costs a few percent at most.",
+    why="A fit that is worse than its start on held-out windows matches the fitted ones by chance, or compensates a "
+    "defect of the model by its parameters; the scatter of estimates costs a few percent at most.",
 )  # fmt: skip
 WHOLE = 100.0
 """What a share in percent would be at best."""
-FAILED = "A run that ends early predicts nothing from there on."
+FAILED = "A run that ends early predicts nothing after its end."
 
 
 def parse(pairs: Sequence[str]) -> tuple[Limit, ...]:

@@ -26,7 +26,8 @@ from crossbody.cases.files.case import rubbing
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.parts import RATIO, Study
-from crossbody.reports.judging.truth import law_of, seconds, truth_of, with_both_sides
+from crossbody.reports.judging.reach import BUDGET, estimated, followed
+from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 
@@ -45,12 +46,14 @@ ENOUGH = 2000
 """Steps of a run that is drawn as it is."""
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
-STUDIES_S, DEARER = 10.0, 3.0
-"""Time that all runs of a study of a scene may take, s, by what its own run took; one at a tight tolerance is taken to
-cost so many times as much."""
-FIRST, DEAR_S = 0.02, 300.0
-"""Part of its horizon by which a run of a scene is estimated, and the time, s, beyond which it is not begun unless its
-profile is asked for: engines that follow the law take their steps in Python."""
+OF_STUDIES, DEARER = 2.0, 3.0
+"""Time that all runs of a study of a scene may take, in budgets, by what its own run took; one at a tight tolerance is
+taken to cost so many times as much."""
+FIRST, DEAR = 0.02, 12.0
+"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
+unless its profile is asked for: engines that follow the law take their steps in Python."""
+COMPILED = ("reference", "compiled")
+"""Who follows what the truth has followed."""
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
 
@@ -153,6 +156,7 @@ def run_case(
     truth: Truth | None = None,
     limit: float = watch.LIMIT,
     refine: bool = True,
+    budget: float = BUDGET,
 ) -> CaseResult:
     """Run a case on every engine asked for.
 
@@ -166,6 +170,8 @@ def run_case(
         truth: of the case, where it is known already.
         limit: time after which an engine that has not come back is ended with its process, s; from the command line.
         refine: whether the parts of errors are told even where no limit judges one.
+        budget: time, s, that the tightest run of a scene may take: its motion is compared as far as it gets, and what
+            else tells more is done where it takes some budgets at most.
 
     Raises:
         UnknownName: for a setting that none of them knows.
@@ -183,7 +189,9 @@ def run_case(
     watch.limited(label, TRUTHS * limit)
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} cannot be had. {why}")
-    case = _with_friction(case) if truth is None else case
+    if truth is None and case.general and case.closed_form is None:
+        reached = followed(_with_friction(case, budget), budget)
+        case, truth = reached.case, truth_of(reached.case, reached, budget)
     truth = truth_of(case) if truth is None else truth
     if case.file and truth.trajectory.outcome is Outcome.INCONSISTENT:
         raise CaseUnsupported(f"{case.label}: {truth.trajectory.message}")
@@ -198,14 +206,14 @@ def run_case(
         watch.limited(label, limit)
         why = watch.lost(label)
         began = perf_counter()
-        entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine)
+        entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine, budget)
         entries.append(replace(entry, took_s=perf_counter() - began))
     watch.unlimited()
     check_known(settings or {}, [(one.engine, one.profile, one.settings) for one in entries if one.run is not None])
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
 
 
-def _with_friction(case: Case) -> Case:
+def _with_friction(case: Case, budget: float) -> Case:
     """Return a file's case with the friction of its contacts where its motion comes to one; else as it is.
 
     Engines without friction run what never comes to any.
@@ -213,18 +221,22 @@ def _with_friction(case: Case) -> Case:
     rubs = rubbing(case)
     if rubs is None:
         return case
-    run = engines.load("reference").prepare(case, "compiled").run()
+    run = engines.load("reference").prepare(case, "compiled", time_limit=budget).run()
     return rubs if run.outcome is Outcome.INCONSISTENT else case
 
 
 def ended(case: Case, pick: Pick, why: str) -> Entry:
-    """The entry of a run that took its process with it: it got no further than its start."""
+    """The entry of a run that took its process with it."""
+    return Entry(engine=pick.engine, profile=pick.profile, run=of_start(case, why), settings={})
+
+
+def of_start(case: Case, why: str) -> Trajectory:
+    """A run that got no further than its start, and why."""
     q, v, nothing = case.q0[None], case.v0[None], np.zeros((1, len(case.contacts)))
-    run = Trajectory(
+    return Trajectory(
         t=np.zeros(1), q=q, v=v, gap=nothing, lam=nothing, energy=np.zeros((1, 2)), mode=nothing.astype(np.int8) - 1,
         outcome=Outcome.TIME_LIMIT, message=why,
     )  # fmt: skip
-    return Entry(engine=pick.engine, profile=pick.profile, run=run, settings={})
 
 
 def of_pick(settings: Mapping[str, Value], pick: Pick) -> dict[str, Value]:
@@ -272,13 +284,14 @@ def check_asked(settings: Mapping[str, Value], wanted: Sequence[Pick]) -> None:
 
 
 def _entry(
-    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
 ) -> Entry:  # fmt: skip
     """The run of one engine; whatever it throws is a row of its own, so that the others are judged all the same."""
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
-        return _ran(case, pick, asked, reference, refine or judges_parts(case, pick.engine, pick.profile))
+        refine = refine or judges_parts(case, pick.engine, pick.profile)
+        return _ran(case, pick, asked, reference, refine, budget)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
@@ -288,18 +301,23 @@ def _entry(
 
 
 def _ran(
-    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
 ) -> Entry:  # fmt: skip
-    if pick.every and (dear := _dear(case, pick, asked)):
+    most = DEAR * budget
+    if pick.every and (dear := _dear(case, pick, asked, most)):
         raise CaseUnsupported(dear)
-    prepared = prepare(case, pick, asked)
+    bounded = pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
+    prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
     shown = prepared.audit()
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     began = process_time()
     natural: Trajectory = prepared.run()
+    if bounded and natural.outcome is Outcome.TIME_LIMIT:
+        raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
     run = _dense(case, pick, prepared, natural, asked)
+    studied = refine and natural.outcome.ok
     return Entry(
         engine=pick.engine,
         profile=pick.profile,
@@ -308,21 +326,24 @@ def _ran(
         run=run,
         stepped=natural.t,
         audit=rows,
-        study=_study(case, pick, prepared, natural, run, took) if refine and natural.outcome.ok else None,
+        study=_study(case, pick, prepared, natural, run, took, OF_STUDIES * budget) if studied else None,
         hidden=hidden,
         own=law_of(prepared.follows) if refine and prepared.follows is not None else None,
     )
 
 
-def _dear(case: Case, pick: Pick, asked: Mapping[str, Value]) -> str:
+def _dear(case: Case, pick: Pick, asked: Mapping[str, Value], most: float) -> str:
     """Return what a run of a scene would cost where that is too much, by its first part; else nothing."""
-    if not case.general or pick.engine == "reference":
+    if not case.general or (pick.engine, pick.profile) == COMPILED:
         return ""
-    prepared = prepare(replace(case, t_end=FIRST * case.t_end), pick, asked)
-    cost = seconds(prepared)[0] / FIRST
-    if cost <= DEAR_S:
-        return ""
-    return f"Too dear: it would take about {cost:.0f} s. -e {pick.engine}:{pick.profile} runs it all the same."
+    first = replace(case, t_end=FIRST * case.t_end)
+    cost, _ = estimated(lambda **more: prepare(first, pick, {**asked, **more}), FIRST, most)
+    return "" if cost <= most else _too_dear(pick, f"about {cost:.0f} s")
+
+
+def _too_dear(pick: Pick, cost: str) -> str:
+    who = f"-e {pick.engine}:{pick.profile}"
+    return f"Too dear: it would take {cost}. {who} runs it all the same, as does a larger --budget."
 
 
 def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:
@@ -350,7 +371,7 @@ def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Ma
 
 
 def _study(
-    case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: Trajectory, took: float
+    case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: Trajectory, took: float, most: float
 ) -> Study:  # fmt: skip
     """The other runs of an engine that tell the parts of its error; those of its model where its equations are known.
 
@@ -380,10 +401,10 @@ def _study(
     setting = next(iter(size))
     for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
         cost = _cost(setting, sizes, size[setting], took)
-        while case.general and cost > STUDIES_S and len(sizes) > LEAST_SIZES:
+        while case.general and cost > most and len(sizes) > LEAST_SIZES:
             sizes = sizes[:-1]
             cost = _cost(setting, sizes, size[setting], took)
-        if case.general and cost > STUDIES_S:
+        if case.general and cost > most:
             return Study(why=f"Runs with other {setting} that tell it would take about {cost:.0f} s.", **told)
         known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
         runs = [known.get(one) or run(**of_scene, **{setting: one}, **samples) for one in sizes]

@@ -9,6 +9,7 @@ may. The command is then begun again without that run; what was complete is on d
 from __future__ import annotations
 
 import ctypes
+import io
 import json
 import mmap
 import os
@@ -20,6 +21,10 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
 
 GRACE = 0.6
 """Time that an interrupted command has to put its things in order, s."""
@@ -116,12 +121,12 @@ def watched(command: Callable[[], int]) -> int:
             number = os.WTERMSIG(status)
             return _say(f"the command was ended by {_name(number)}; please report it.{_advice(number)}", 3)
         _lost[label] = _why(os.WTERMSIG(status), _diary.read())
-        _say(f"{label}: {_lost[label]} The rest goes on without it.", 1)
+        _say(f"{label}: {_lost[label]} The others continue without it.", 1)
 
 
 def _why(number: int, told: dict[str, object]) -> str:
     if number == signal.SIGKILL and time.monotonic() >= float(str(told.get("until", "inf"))):
-        return f"It did not come back within {float(str(told['seconds'])):g} s and was ended; see --time-limit."
+        return f"It did not return within {float(str(told['seconds'])):g} s and was terminated; see --time-limit."
     return f"Its process was ended by {_name(number)}.{_advice(number)}"
 
 
@@ -129,7 +134,7 @@ def _advice(number: int) -> str:
     """What to do about a signal by which code of ours or of a user's kernels has crashed."""
     if number not in (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGILL, signal.SIGFPE):
         return ""
-    return " If it runs kernels of your own, CROSSBODY_DEBUG=1 in the environment makes them check every index."
+    return " If it runs your own kernels, CROSSBODY_DEBUG=1 in the environment makes them check every index."
 
 
 def _name(number: int) -> str:
@@ -271,6 +276,7 @@ def _obey(command: Callable[[], int]) -> None:
     code = 3
     try:
         _die_with_parent()
+        sys.stdout, sys.stderr = _unread(sys.stdout), _unread(sys.stderr)
         signal.signal(signal.SIGINT, _stop_once)
         signal.signal(signal.SIGALRM, _stop_again)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -283,6 +289,29 @@ def _obey(command: Callable[[], int]) -> None:
         traceback.print_exc()
     finally:
         _leave(code)
+
+
+class _Pipe(io.FileIO):
+    """An output whose reader may leave: what is said then goes nowhere, and the command does its work all the same."""
+
+    def write(self, data: Buffer, /) -> int:
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            return super().write(data)
+
+
+def _unread(stream: TextIO) -> TextIO:
+    """Return a stream that nobody has to read to its end; the same one if it is no file of the system's."""
+    try:
+        raw = _Pipe(stream.fileno(), "wb", closefd=False)
+    except (AttributeError, OSError, ValueError):  # closed, or made by Python
+        return stream
+    stream.flush()
+    return io.TextIOWrapper(
+        io.BufferedWriter(raw), stream.encoding, stream.errors, line_buffering=stream is sys.stderr or raw.isatty()
+    )
 
 
 def _leave(code: int) -> None:

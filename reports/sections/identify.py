@@ -13,7 +13,8 @@ from crossbody.reports.runs.study import read_json
 
 TITLE = "Identification"
 ESTIMATES = columns(
-    name="Parameter", value=("Estimate", Kind.NUMBER), low=("95 % from", Kind.NUMBER), high=("to", Kind.NUMBER),
+    name="Parameter", value=("Estimate", Kind.NUMBER),
+    half=("± (95 %)", Kind.NUMBER), low=("From", Kind.NUMBER), high=("to", Kind.NUMBER),
     unit="Unit", start=("Start", Kind.NUMBER), identifiable="Identifiable",
     first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
 )  # fmt: skip
@@ -23,9 +24,9 @@ HELD = columns(
     change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 PROFILE = (
-    "The cost (sum of squares over that at the estimate) while one parameter is moved and all others follow it. A "
-    "parabola whose ends are at the same height says that intervals from derivatives can be trusted; a flat or "
-    "lopsided one says that they cannot. Estimates whose correlation is near 1 or -1 are told apart by little."
+    "The profile is the increase of the cost (sum of squares) when one parameter is moved and all others are fitted "
+    "again. If it is a symmetric parabola, the intervals from derivatives can be trusted; if it is flat or "
+    "asymmetric, they cannot. The data hardly separate parameters whose correlation is near 1 or -1."
 )
 
 
@@ -36,6 +37,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     from crossbody.reports.replay import figure
 
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
+    estimates["half"] = (estimates["high"] - estimates["low"]) / 2.0
     told = read_json(out / "identify.json")["provenance"]["fit"]
     tables = (
         Table(title="Estimates", columns=ESTIMATES, rows=records(_only(estimates, ESTIMATES)), file="identify.csv"),
@@ -54,7 +56,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     first = Section(name="identify", title="Identified parameters", text=_told(estimates, held, told), tables=tables)
     if not plots:
         return (first,)
-    return (first, Section(name="identify-plots", title="How well the data tell them", text=PROFILE, plots=plots))
+    return (first, Section(name="identify-plots", title="How well they are determined", text=PROFILE, plots=plots))
 
 
 def _only(rows: pd.DataFrame, shown: Sequence[Column]) -> pd.DataFrame:
@@ -69,6 +71,6 @@ def _told(estimates: pd.DataFrame, held: pd.DataFrame, told: Mapping[str, Any]) 
     )
     rmse = next((row for row in records(held) if row["error"] == "rmse"), None)
     if rmse is not None and rmse["held_before"] is not None and rmse["held_after"] is not None:
-        text += f" On windows that were not fitted the rmse went from {rmse['held_before']:.4g} to "
+        text += f" On held-out windows the rmse changed from {rmse['held_before']:.4g} to "
         text += f"{rmse['held_after']:.4g} ({rmse.get('verdict') or 'not judged'})."
     return f"{text} {' '.join(told['warnings'])} Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."

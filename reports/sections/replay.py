@@ -11,10 +11,10 @@ from crossbody.reports.runs.study import read_json
 
 TITLE = "Replay"
 TEXT = (
-    "The model starts in each window from what was measured there and runs on recorded inputs, held between their "
-    "recorded times. Residuals are averaged over a twelfth of the motion's period; where what is left is noise, and an "
-    "error no larger than that of one sample, 99 of 100 correlations lie within the band. Grey bands are two standard "
-    "deviations of the measurement's noise; windows that an identification held out are shaded."
+    "In each window the model starts from the measured state and is driven by the recorded inputs, held between their "
+    "recorded times. Residuals are averaged over a twelfth of the motion's period; if they are noise, plus an error no "
+    "larger than the noise of one sample, 99 of 100 correlations lie within the band. Grey bands are two standard "
+    "deviations of the measurement noise; windows held out of an identification are shaded."
 )
 METRICS = columns(
     who="Engine", metric="Metric", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
@@ -46,7 +46,7 @@ def sections(out: Path) -> tuple[Section, ...]:
             plots.append(Plot(name=name, figure=draw(left, noise, held), time=True))
     plots += [Plot(name="replay-correlation", figure=figure.correlation(correlated))] if len(correlated) else []
     origin = "SYNTHETIC, no measurement." if about["synthetic"] else "A measurement."
-    text = f"{judged(metrics)} {origin} {about['file']}: {about['about']}"
+    text = f"{judged(metrics)} {origin} {about['file']}{about['about'] and ': '}{about['about']}"
     table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")
     shown = [
         Section(name="replay", title="Log and model", text=text, tables=(table,)),
@@ -54,7 +54,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     ]
     if len(found):
         table = Table(title="Findings about the log", columns=FINDINGS, rows=records(found), file="findings.csv")
-        shown.append(Section(name="replay-log", title="The log itself", tables=(table,)))
+        shown.append(Section(name="replay-log", title="Checks of the log", tables=(table,)))
     return tuple(shown)
 
 
@@ -63,11 +63,11 @@ def judged(metrics: pd.DataFrame) -> str:
     rows = metrics.fillna({"verdict": ""})
     rows = rows[rows["verdict"].isin(["within", "outside"])]
     if rows.empty:
-        return "No limit was given, so nothing is judged (--limit fit=90 would)."
+        return "Nothing is judged, since no limit was given (for example --limit fit=90)."
     off = rows[rows["verdict"] == "outside"]
     named = [
         f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g} {row.unit}" for row in off.itertuples()
     ]
-    return f"{len(rows) - len(off)} of {len(rows)} limits are kept." + (
+    return f"{len(rows) - len(off)} of {len(rows)} limits are met." + (
         f" Outside: {', '.join(named)}." if named else ""
     )

@@ -761,7 +761,7 @@ def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     case = cases.from_file(write(tmp_path), "raised")
-    monkeypatch.setattr(jobs, "DEAR_S", 0.0)
+    monkeypatch.setattr(jobs, "DEAR", 0.0)
     wanted = [next(iter(jobs.picks([name]))) for name in ("pinocchio", "pinocchio:law")]
     every, asked = jobs.run_case(case, wanted).entries
     assert every.run is None
@@ -769,6 +769,16 @@ def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
     assert "-e pinocchio:law" in every.skipped
     assert asked.run is not None
     assert asked.run.outcome is Outcome.FINISHED
+
+
+def test_a_run_that_seemed_cheap_and_is_not_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jobs, "DEAR", 1e-9)
+    monkeypatch.setattr(jobs, "estimated", lambda *_: (0.0, 1))
+    wanted = jobs.picks(["reference"])
+    ours, *others = jobs.run_case(cases.from_file(write(tmp_path), "raised"), wanted).entries
+    assert ours.run is not None
+    assert ours.run.outcome is Outcome.FINISHED
+    assert all("Too dear: it would take more than" in entry.skipped for entry in others)
 
 
 def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path) -> None:

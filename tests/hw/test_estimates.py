@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from crossbody.hw.fitting.agreement import agreement
-from crossbody.hw.fitting.covariance import Layout, scatter, whiteness
+from crossbody.hw.fitting.covariance import Layout, _lagged, scatter, whiteness
 from crossbody.hw.fitting.information import in_words, information, to_keep, unseen_by
+from crossbody.hw.replaying.inverse import noise_of
 
 PARAMETERS = 3
 SHAPES = ("polynomials", "waves", "growing waves")
@@ -154,3 +155,27 @@ def test_halves_disagree_where_the_parameter_moved_and_seldom_else(layout: Layou
                 assert halves[1].values[1] - halves[1].values[0] == pytest.approx(1.0, abs=0.5)
     assert np.mean([agrees for moved, agrees in told if not moved]) > 0.9
     assert np.mean([agrees for moved, agrees in told if moved]) < 0.1
+
+
+@pytest.mark.parametrize("lag", [1, 2, 3])
+@pytest.mark.parametrize("samples", [(12,) * 40, (40,) * 12, (12, 200, 30)])
+def test_correlations_of_white_noise_have_the_variance_that_they_are_told_in(
+    samples: tuple[int, ...], lag: int
+) -> None:  # fmt: skip
+    """At every lag, in short windows, which have few pairs, as in long ones."""
+    random = np.random.default_rng(7 + lag)
+    layout = Layout(samples=samples, k=1)
+    basis = np.linalg.qr(design("polynomials", layout, random))[0]
+    draws = noise(layout, 0.0, 1000, random)
+    scores = np.array([_lagged(e, basis, layout, lag) for e in (draws - basis @ (basis.T @ draws)).T])
+    assert scores.mean() == pytest.approx(0.0, abs=0.15)
+    assert scores.var() == pytest.approx(1.0, rel=0.16)
+
+
+@pytest.mark.parametrize(("half", "degree"), [(3, 2), (5, 3), (12, 4), (20, 5)])
+def test_noise_about_polynomials_is_what_was_put_in(half: int, degree: int) -> None:
+    """However much of it the polynomials take."""
+    random = np.random.default_rng(half)
+    t = np.linspace(0.0, 2.0, 20_000)
+    y = np.column_stack([np.sin(t) + 1e-2 * random.standard_normal(len(t)), 3.0 * random.standard_normal(len(t))])
+    assert noise_of(t, y, half, degree) == pytest.approx([1e-2, 3.0], rel=0.02)

@@ -27,7 +27,7 @@ from crossbody.reports.cli import main
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.runs.jobs import Pick
 
-ORDERS = {"second": 2.0, "liar": 4.0, "fails": 1.0}
+ORDERS = {"second": 2.0, "liar": 4.0, "fails": 1.0, "throws": 1.0}
 
 
 @dataclass
@@ -41,6 +41,8 @@ class FakeRun(engines.Run):
 
     def run(self) -> Trajectory:
         dt = float(self.settings["dt"])
+        if self.profile == "throws":
+            raise ZeroDivisionError("planted")
         exact = truth_of(self.case).trajectory
         bad = self.profile == "fails" and dt > 1e-3
         return replace(
@@ -98,7 +100,7 @@ def test_one_row_a_rung_with_every_error(rows: pd.DataFrame) -> None:
     np.testing.assert_allclose(second["error_v"], 0.0, atol=1e-12)
     np.testing.assert_allclose(second["median_ms"], 1.0 / second["setting"])
     assert (second["call_ms"] > 0.0).all()
-    assert (rows["repeats"] == 2).all()
+    assert (rows["repeats"] == np.where(rows["profile"] == "throws", 1, 2)).all()
     assert set(rows["tier"]) == {"A"}
     ours = rows[rows["engine"] == "reference"]
     np.testing.assert_allclose(ours["honesty"], ours["error"] / ours["setting"])
@@ -109,6 +111,15 @@ def test_a_failed_run_stays_as_a_row_without_an_error(rows: pd.DataFrame) -> Non
     assert failed.loc[4e-3, "outcome"] == "diverged"
     assert np.isinf(failed.loc[4e-3, "error"])
     assert np.isfinite(failed.loc[1e-3, "error"])
+
+
+def test_a_run_that_throws_stays_as_a_row_and_the_others_are_timed(rows: pd.DataFrame) -> None:
+    thrown = rows[rows["profile"] == "throws"]
+    assert len(thrown)
+    assert thrown["outcome"].str.startswith("crashed: ZeroDivisionError: planted").all()
+    assert np.isinf(thrown["error"]).all()
+    says = headline(rows).set_index("profile").loc["throws", "says"]
+    assert says.startswith("reaches no error") and "ZeroDivisionError: planted" in says  # noqa: PT018 - one sentence
 
 
 def test_orders_are_held_against_promises(rows: pd.DataFrame) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from unpacked import numbers
 
 from crossbody import engines
 from crossbody.cases import EngineUnavailable, Mode, Trajectory
@@ -57,17 +58,17 @@ def test_summary_says_where_most_is_made_and_from_where_on_it_is_ideal(rows: pd.
 
 def test_figure_has_two_plots_a_number_of_balls(rows: pd.DataFrame) -> None:
     drawn = figure(rows)
-    named = [trace for trace in drawn.data if trace.mode == "lines"]
+    named = [trace for trace in drawn["data"] if trace["mode"] == "lines"]
     assert len(named) == 2 * 2 * 2
-    assert sum(trace.showlegend for trace in named) == 2
-    assert "sqrt(a0)" in drawn.layout.xaxis3.title.text
+    assert sum(trace["showlegend"] for trace in named) == 2
+    assert "sqrt(a0)" in drawn["layout"]["xaxis3"]["title"]["text"]
 
 
 def test_a_failed_run_is_a_cross(rows: pd.DataFrame) -> None:
     failed = rows.head(3).assign(outcome="step_limit", energy_created=np.nan, why="too many")
-    crosses = [trace for trace in figure(failed).data if trace.mode == "markers"]
+    crosses = [trace for trace in figure(failed)["data"] if trace["mode"] == "markers"]
     assert crosses
-    assert all(len(trace.x) == 3 and trace.marker.symbol == "x" for trace in crosses)
+    assert all(len(numbers(trace["x"])) == 3 and trace["marker"]["symbol"] == "x" for trace in crosses)
     lines = gapmap.summary(failed)
     assert lines["failed"].tolist() == [3]
     assert lines["why"].tolist() == ["too many"]

@@ -12,7 +12,8 @@ from crossbody.cases.mechanisms.soft.claims import STEP
 from crossbody.cases.mechanisms.soft.form import fastest
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.reports.judging.comparison import judged
-from crossbody.reports.judging.truth import _tight, truth_of
+from crossbody.reports.judging.reach import tight
+from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import limit_for
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.impulse import with_collisions
@@ -54,7 +55,7 @@ def test_no_integrator_of_ours_is_outside_at_any_horizon(name: str, variant: str
 )
 def test_a_truth_has_both_sides_of_every_event_of_one_motion(name: str, variant: str) -> None:
     case = cases.load(name, variant)
-    truth, natural = truth_of(case), _tight(case)
+    truth, natural = truth_of(case), tight(case)
     assert truth.tier is Tier.C, "what it is held against is independent"
     assert truth.trajectory.events == natural.events
     events = np.unique([event.t for event in natural.events if 0.0 < event.t < case.t_end])  # rows may switch together

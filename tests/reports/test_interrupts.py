@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+import study_pages
 from joblib.externals.loky import get_reusable_executor
 from places import STUCK
 from rig_data import run_as_log
@@ -30,6 +31,10 @@ from crossbody.reports import cli
 from crossbody.reports.replay.kept import keeper
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.parts import Parts
+
+ARM = """<mujoco><worldbody><body name="arm"><joint name="shoulder" axis="0 1 0"/>
+<inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .01"/></body></worldbody></mujoco>
+"""
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -270,11 +275,11 @@ def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_p
     words = ("-e", "fake:stuck", "-e", "fake:exact", "-e", "fake:crash", "--time-limit", limit)
     code, said = finished(begun("run", "balls.py", "--variant", "linear", *words, cwd=tmp_path))
     assert code == 1, said
-    assert f"fake:stuck: It did not come back within {limit} s and was ended" in said
+    assert f"fake:stuck: It did not return within {limit} s and was terminated" in said
     assert "fake:crash: Its process was ended by SIGSEGV" in said
     assert "CROSSBODY_DEBUG=1" in said
     rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet").set_index("profile")
-    for profile, why in (("stuck", "did not come back"), ("crash", "SIGSEGV")):
+    for profile, why in (("stuck", "did not return"), ("crash", "SIGSEGV")):
         mine = rows.loc[[profile]]
         assert (mine["verdict"] == "outside").any()
         assert mine["why"].str.contains(why).any()
@@ -287,9 +292,9 @@ def test_an_identification_that_never_comes_back_is_ended(tmp_path: Path) -> Non
     words = ("identify", "log.parquet", "-m", "ball", "-f", "a1", "--set", "a1=20", "--time-limit", "0.25")
     code, said = finished(begun(*words, cwd=tmp_path))  # waits less than an hour, which is what it may take unasked
     assert (code, said.count("\n")) == (2, 2)
-    assert "ball identified from log.parquet: It did not come back within 2.5 s and was ended" in said
+    assert "ball identified from log.parquet: It did not return within 2.5 s and was terminated" in said
     said = said.splitlines()[1]
-    assert said.startswith("crossbody: ball identified from log.parquet: It did not come back")
+    assert said.startswith("crossbody: ball identified from log.parquet: It did not return")
     assert not (tmp_path / "out").exists()
 
 
@@ -362,16 +367,27 @@ def test_a_child_that_has_ended_already_is_not_told_to(monkeypatch: pytest.Monke
     assert one.signalled == signal.SIGINT
 
 
-def test_a_reader_that_has_enough_is_no_fault(tmp_path: Path) -> None:
-    command = [sys.executable, "-c", ENTRY, "list"]
-    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    assert process.stderr is not None
-    process.stdout.readline()
-    process.stdout.close()
-    with process.stderr as said:
-        assert said.read() == ""
-    assert process.wait(timeout=20) == 0
+def test_a_reader_that_has_enough_is_no_fault_and_the_work_is_done(tmp_path: Path) -> None:
+    """Of every command: nobody reads a word of it, and it ends as it would, with all that it has to write."""
+    (tmp_path / "arm.xml").write_text(ARM)
+    one = ("bouncing_ball", "--variant", "linear", "-e", "reference:compiled")
+    asked = {name: (*words, "--out", name) for name, words in study_pages.commands(tmp_path).items()}
+    asked |= {
+        "run": (*one, "--out", "run"), "bench": (*one, "--repeats", "1", "--minutes", "0.1", "--out", "bench"),
+        "report": ("run",), "picture": ("run", "ball.svg"), "list": (), "cache": (),
+        "audit": ("arm.xml", "-e", "mujoco", "--markdown", "told.md"), "log": ("info", "rig.csv"),
+    }  # fmt: skip
+    assert set(asked) == set(cli.cli.commands) - {"stability", "warm"}  # which take minutes
+    for name, words in asked.items():
+        here, there = os.pipe()
+        os.close(here)
+        command = [sys.executable, "-c", ENTRY.replace("print('.', flush=True); ", ""), name, *words]
+        process = subprocess.run(command, cwd=tmp_path, stdout=there, stderr=subprocess.PIPE, text=True, timeout=300)
+        os.close(there)
+        assert (process.returncode, process.stderr) == (0, ""), name
+        assert "--out" not in words or (tmp_path / name / "index.html").is_file(), name
+    assert (tmp_path / "ball.svg").is_file()
+    assert (tmp_path / "told.md").is_file()
 
 
 LATE = """

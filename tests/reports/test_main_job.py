@@ -1,18 +1,38 @@
-"""The main job, `crossbody run`: the bouncing ball on every engine; nothing is outside."""
+"""The main job, `crossbody run`: the bouncing ball on every engine; nothing is outside, and its report can be sent."""
 
 from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
 
 import pytest
 
 from crossbody import cases
 from crossbody.reports.judging.told import WRONG
+from crossbody.reports.pages import site
 from crossbody.reports.runs import jobs, study
+from crossbody.reports.runs.output import folder
+
+CASE = jobs.DEFAULT_CASES[0]
 
 
-@pytest.mark.parametrize("variant", cases.variants(jobs.DEFAULT_CASES[0]))
+@cache
+def result(variant: str) -> jobs.CaseResult:
+    return jobs.run_case(cases.load(CASE, variant), jobs.picks(()))
+
+
+@pytest.mark.parametrize("variant", cases.variants(CASE))
 def test_no_engine_is_outside(variant: str) -> None:
     """Also of known deviations, whose stored sizes follow from what numbers are measured by."""
-    case = cases.load(jobs.DEFAULT_CASES[0], variant)
-    rows = study.judge([jobs.run_case(case, jobs.picks(()))], {case.label: "again"})
+    rows = study.judge([result(variant)], {result(variant).case.label: "again"})
     assert len({row["engine"] for row in rows}) > 3
     assert not [(row["engine"], row["metric"], row["value"], row["why"]) for row in rows if row["verdict"] in WRONG]
+
+
+def test_the_report_in_one_file_is_below_three_megabytes(tmp_path: Path) -> None:
+    results = [result(variant) for variant in cases.variants(CASE)]
+    again = {one.case.label: "crossbody run" for one in results}
+    with folder(tmp_path / "out") as made:
+        study.write(made, results, study.judge(results, again), {"command": "crossbody run", "time": ""})
+        site.write(made, single_file=True)
+    assert 1e6 < (tmp_path / "out" / "index.html").stat().st_size < 3e6

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Ledger, Tier, Trajectory, load
+from crossbody.cases import Case, Ledger, Mode, Tier, Trajectory, load
+from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring import scale
 from crossbody.reports.measuring.alignment import clock
+from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, from_run, sample_times
 
@@ -192,3 +194,106 @@ def test_sample_times_hold_both_sides_of_every_event(truth: Truth, case: Case) -
 def test_ledger_shape_is_kept(truth: Truth) -> None:
     assert isinstance(truth.trajectory.ledger, Ledger)
     assert truth.trajectory.ledger.contact.shape == truth.trajectory.lam.shape
+
+
+def coarse(truth: Truth) -> Trajectory:
+    """The truth at so few samples that metrics which look at some of a run look at all of them."""
+    run = truth.at(np.linspace(0.0, float(truth.trajectory.t[-1]), 301))
+    return replace(run, events=truth.trajectory.events)
+
+
+WORST = {
+    "position": "q", "velocity": "v", "gap_error": "gap", "gap_residual": "gap", "energy_drift": "energy",
+    "energy_residual": "energy", "law_residual": "lam", "contact_work": "contact", "energy_integrator": "contact",
+}  # fmt: skip
+"""Metric that is the largest of something -> what is spoiled."""
+
+
+def spoiled(run: Trajectory, signal: str, at: dict[int, float]) -> Trajectory:
+    """The run with parts of the largest value added to one signal at some samples."""
+    if signal == "contact":
+        assert run.ledger is not None
+        return replace(run, ledger=replace(run.ledger, contact=_spoiled(run.ledger.contact, at)))
+    return replace(run, **{signal: _spoiled(getattr(run, signal), at)})
+
+
+def _spoiled(values: Floats, at: dict[int, float]) -> Floats:
+    found = values.copy()
+    for k, part in at.items():
+        found[k, 0] += part * np.abs(values).max()
+    return found
+
+
+@pytest.mark.parametrize("name", WORST)
+def test_the_worst_sample_counts(name: str, truth: Truth, case: Case) -> None:
+    """Neither their mean, nor the last one, nor what others cancel."""
+    run = coarse(truth)
+    pressed = np.flatnonzero(run.lam[:, 0] > 0.0)
+    first, middle, last = (int(k) for k in pressed[[len(pressed) // 4, len(pressed) // 2, -2]])
+    right, worst, both = (
+        measure(name, truth, spoiled(run, WORST[name], at), case)
+        for at in ({}, {middle: 0.02}, {first: -0.01, middle: 0.02, last: -0.01})
+    )
+    assert worst > 1e3 * max(right, 1e-12)
+    assert both == pytest.approx(worst, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", WORST)
+def test_nothing_is_compared_behind_the_time_for_which_a_truth_is_trusted(
+    name: str, truth: Truth, case: Case
+) -> None:  # fmt: skip
+    """Whoever asks: the judge cuts the truth there, others do not."""
+    run, until = coarse(truth), 0.6 * case.t_end
+    late = dict.fromkeys(np.flatnonzero(run.t > 1.01 * until).tolist(), 0.5)
+    value = measure(name, replace(truth, trusted=until), spoiled(run, WORST[name], late), case)
+    if name.endswith(("_residual", "_integrator")):  # which hold a run against itself
+        assert value > 0.1
+    else:
+        assert value < 1e-6
+
+
+@pytest.mark.parametrize(("name", "signal"), [("velocity", "v"), ("start_error", "v"), ("position", "q")])
+def test_what_hardly_moves_is_measured_by_what_the_scene_says_of_it(name: str, signal: str) -> None:
+    """Rates by rates, and positions by sizes."""
+    case = load("bouncing_ball", "linear", height=0.0)
+    coordinates, velocities = (
+        tuple(replace(one, size=2.0, rate=50.0) for one in named) for named in (case.coordinates, case.velocities)
+    )
+    case = replace(case, coordinates=coordinates, velocities=velocities)
+    t = np.linspace(0.0, case.t_end, 11)
+    none, start = np.zeros((11, 1)), np.zeros(1)
+    still = Trajectory(
+        t=t, q=none, v=none, gap=none, lam=none, energy=np.zeros((11, 2)), mode=np.zeros((11, 1), np.int8), events=(),
+        steps=10,
+    )  # fmt: skip
+    truth = from_run(still, Tier.A, "at rest")
+    off = replace(still, **{signal: none + 1e-3})
+    value = measure(name, truth, off, replace(case, q0=start, v0=start))
+    assert value == pytest.approx(1e-3 / (50.0 if signal == "v" else 2.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [("friction_power", (-1.0, -2.0)), ("cone_violation", (2.0, 3.0)), ("friction_angle", (1.0, -1.0))],
+)
+def test_the_worst_sample_of_friction_counts(name: str, parts: tuple[float, float]) -> None:
+    case = load("sliding_block", "turns")
+    truth = truth_of(case)
+    run = coarse(truth)
+    system = equations(case)
+    assert system is not None
+    along = np.flatnonzero(np.asarray(system.follows) >= 0)
+    slides = np.flatnonzero((run.mode == Mode.SLIP).any(axis=1) & run.lam[:, along].any(axis=1))
+    first, middle = int(slides[len(slides) // 3]), int(slides[len(slides) // 2])
+
+    def found(at: dict[int, float]) -> float:
+        lam = run.lam.copy()
+        for k, part in at.items():
+            lam[k, along] *= part
+        value = metrics.of(case)[name].measure(truth, replace(run, lam=lam), case)
+        assert value is not None
+        return value
+
+    right, worst = found({}), found({middle: parts[1]})
+    assert worst > 1e3 * max(right, 1e-12)
+    assert found({first: parts[0], middle: parts[1]}) == pytest.approx(worst)

@@ -397,6 +397,14 @@ def test_a_page_of_given_sections(out: Path) -> None:
     assert not (out / "replay.html").is_file()
 
 
+def test_a_column_without_a_value_is_left_out(out: Path) -> None:
+    rows = [{"a": "x", "b": None, "c": float("nan"), "d": 0.0}, {"a": "y", "b": "", "c": None, "d": None}]
+    given = Table(title="Numbers", columns=columns(a="A", b="B", c=("C", Kind.NUMBER), d=("D", Kind.NUMBER)), rows=rows)
+    text = site.write_page(out, "some", "Some", [Section(name="s", title="S", tables=(given,))]).read_text()
+    assert re.findall(r"<th scope=.col.[^>]*>(.)</th>", text) == ["A", "D"]
+    site.write(out)
+
+
 def test_long_steps_are_drawn_as_cubics(result: CaseResult) -> None:
     run = result.truth.trajectory
     t = np.linspace(0.0, 0.4, 5)

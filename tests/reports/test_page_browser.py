@@ -15,7 +15,8 @@ from ladder import ladder
 from resting import plate
 from study_pages import studies
 
-from crossbody.cases import load
+from crossbody.cases import from_scene, load
+from crossbody.cases.scene import Body, Joint, Scene, Shape
 from crossbody.engines import load as load_engine
 from crossbody.reports import sections
 from crossbody.reports.judging.comparison import Entry
@@ -175,6 +176,38 @@ def test_a_scene_is_turned_and_looked_at_from_near(solids: Path, browser: chromi
         assert seen != first, way
         first = seen
     assert browser.complaints() == []
+
+
+def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium.Browser) -> None:
+    """Nothing but the ground is on the edge of the picture."""
+    rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, 0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
+    shape = Shape(name="bar", body="rod", type="capsule", size=(0.05, 0.5, 0.0), position=(0.0, 0.0, 0.5))
+    hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0))
+    case = from_scene(Scene(bodies=(rod,), joints=(hinge,), shapes=(shape,)), q0=[0.1], t_end=0.5)
+    truth = truth_of(case)
+    results = [CaseResult(case=case, truth=truth, entries=())]
+    with folder(tmp_path / "out") as made:
+        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
+        site.write(made)
+    (page,) = (tmp_path / "out").glob("case-*.html")
+    browser.open(page)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    edge = (
+        "(() => { const c = document.querySelector('.player canvas'); const g = c.getContext('2d');"
+        " const seen = new Set();"
+        " for (const [x, y, w, h] of [[0, 0, c.width, 1], [0, c.height - 1, c.width, 1], [0, 0, 1, c.height],"
+        " [c.width - 1, 0, 1, c.height]])"
+        " new Uint32Array(g.getImageData(x, y, w, h).data.buffer).forEach((p) => seen.add(p));"
+        " const all = new Set(new Uint32Array(g.getImageData(0, 0, c.width, c.height).data.buffer));"
+        " return [seen.size, all.size]; })()"
+    )
+    for key in ("", "ArrowLeft", "ArrowUp", "ArrowUp", "ArrowUp", "ArrowUp", "ArrowLeft"):
+        press = f"new KeyboardEvent('keydown', {{key: '{key}'}})"
+        browser.js(f"document.querySelector('.player canvas').dispatchEvent({press})")
+        browser.js("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        at_edge, drawn = browser.js(edge)
+        assert at_edge == 1
+        assert drawn > 10
 
 
 def test_zoom_is_shared_and_keeps_events_sharp(out: Path, browser: chromium.Browser) -> None:

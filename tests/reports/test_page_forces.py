@@ -12,7 +12,7 @@ from crossbody.cases import Trajectory, load
 from crossbody.cases.arrays import Floats
 from crossbody.engines import load as load_engine
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.figures import force
+from crossbody.reports.pages.figures import force, note, suits
 from crossbody.reports.pages.hysteresis import hysteresis
 from crossbody.reports.runs.jobs import Pick, run_case
 from crossbody.reports.runs.store import Trace
@@ -62,3 +62,20 @@ def test_a_force_beyond_the_plot_is_named(run: Trajectory) -> None:
     calm = force([trace(run), trace(replace(run, lam=1.2 * run.lam), "calm")])
     assert "Off scale" not in calm["layout"]["title"]["text"]
     assert "range" not in calm["layout"]["yaxis"]
+    (section,) = hysteresis([trace(run), trace(replace(run, lam=100.0 * run.lam), "wild")])
+    shape = section.plots[0].figure["layout"]
+    assert shape["yaxis"]["range"] == drawn["layout"]["yaxis"]["range"]
+    assert shape["title"]["text"].endswith(f"Off scale: wild:p reaches {100.0 * top:.2g} N")
+
+
+def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> None:
+    def wide(lam: Floats) -> Trace:
+        doubled = {name: np.repeat(getattr(run, name), 2, axis=1) for name in ("gap", "mode")}
+        found = trace(replace(run, lam=np.c_[lam, 0.0 * lam], ledger=None, **doubled))
+        return replace(found, about=found.about | {"contacts": ["floor", "wall"]}, truth=None)
+
+    bears, idles = wide(run.lam), wide(0.0 * run.lam)
+    titles = [axis["title"]["text"] for key, axis in force([bears])["layout"].items() if key.startswith("yaxis")]
+    assert [text.partition("<br>")[0] for text in titles] == ["lam floor", "impulse"]
+    assert note("force", [bears]).endswith("Without a force in every run: wall.")
+    assert (suits("force", [bears]), suits("force", [idles])) == (True, False)

@@ -37,6 +37,23 @@ def test_slip_is_that_of_the_equations(trace: Trace) -> None:
         assert np.abs(drawn - found.slip[:, m]).max() <= 1e-8 * max(1.0, np.abs(found.slip).max())
 
 
+def test_slip_on_a_belt_is_the_block_less_the_belt() -> None:
+    """By hand, in the laboratory: x'' = mu g - w^2 x from rest to x' = V; stick; then x' = V cos w (t - t_2)."""
+    case = load("block_on_belt")
+    p = {name: float(value) for name, value in case.parameters.items()}
+    run = load_engine("reference").prepare(case, "compiled", samples=np.linspace(0.0, case.t_end, 400)).run()
+    (section,) = friction([Trace(about=study._about(case, "reference", "compiled"), run=run)])
+    (line,) = section.plots[2].figure["data"]
+    drawn = {float(t): (x, y) for t, x, y in zip(run.t, numbers(line["x"]), numbers(line["y"]), strict=True)}
+    V, g, w = p["speed"], p["gravity"], np.sqrt(p["stiffness"])  # of a kilogram
+    sticks = np.arcsin(V * w / (p["mu"] * g)) / w
+    slides = sticks + (p["mu"] * g / w**2 * np.cos(w * sticks)) / V
+    for t, (along, across) in drawn.items():
+        rate = p["mu"] * g / w * np.sin(w * t) if t < sticks else V if t < slides else V * np.cos(w * (t - slides))
+        assert abs(along - (rate - V)) < 1e-6
+        assert abs(across) < 1e-12
+
+
 def test_what_slides_is_on_the_edge_and_against_its_slip(trace: Trace) -> None:
     (section,) = friction([trace])
     cone, plane, slips = (plot.figure for plot in section.plots)

@@ -36,7 +36,7 @@ def test_cases_at_once_give_the_rows_of_cases_one_by_one(tmp_path: Path) -> None
     assert {row["variant"] for row in alone[1]} == {"linear", "resting", "listing"}
 
 
-@pytest.mark.parametrize(("profile", "why"), [("crash", "SIGSEGV"), ("stuck", "did not come back within 4 s")])
+@pytest.mark.parametrize(("profile", "why"), [("crash", "SIGSEGV"), ("stuck", "did not return within 4 s")])
 def test_what_is_ended_beside_others_is_a_row_and_an_exit_code(tmp_path: Path, profile: str, why: str) -> None:
     code, rows, told = said(tmp_path, "-e", f"fake:{profile}", "--time-limit", "4", "--out", "o", "--jobs", "2")
     assert code == 1

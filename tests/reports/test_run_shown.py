@@ -55,7 +55,7 @@ def test_a_run_that_nothing_judges_is_not_counted_as_within() -> None:
     text = sentence(runs_of(rows))
     assert text.startswith("1 of 1 runs are within all limits.")
     assert "Without a limit: b:matched on ball:v." in text
-    assert sentence(runs_of(rows[1:])) == "Nothing is judged here: no number has a limit."
+    assert sentence(runs_of(rows[1:])) == "Nothing is judged, since no number has a limit."
 
 
 def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_as_within() -> None:
@@ -68,7 +68,7 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
     ]
     text = sentence(runs_of(rows))
     assert text.startswith("1 of 2 runs are within all limits. Without a limit: c:matched on ball:v.")
-    assert text.endswith("no bound on how far: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
+    assert text.endswith("known cause without a bound: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
     step = row("b", part_of("position", "step"), 2.0e-5, Word.INFO)
     assert "24 times its limit, mostly its step" in sentence(runs_of([*rows, step]))
 

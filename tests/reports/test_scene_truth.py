@@ -7,14 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from four_bars import four_bar
+from hypothesis import given
+from hypothesis import strategies as st
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome, Tier, Trajectory
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
-from crossbody.reports.judging.truth import LEAST, MANY, tightened, truth_of
+from crossbody.reports.judging.reach import LEAST, MANY, SHORTEST, cut_short, followed
+from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.truth import Truth, from_run, shortened
+from crossbody.reports.runs.jobs import picks, run_case
 
 INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
 
@@ -22,7 +26,7 @@ INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
 @pytest.fixture(autouse=True)
 def one_witness(monkeypatch: pytest.MonkeyPatch) -> None:
     """CVODE alone: what is asked here does not depend on who the witness is."""
-    monkeypatch.setattr("crossbody.reports.judging.truth._witness", lambda case: "not asked")
+    monkeypatch.setattr("crossbody.reports.judging.truth._witness", lambda case, limit: "not asked")
 
 
 def pendulum(length: float, above: bool, q0: float, t_end: float = 1.0) -> Case:
@@ -143,7 +147,7 @@ def test_a_fault_of_a_per_cent_is_seen_beside_a_far_body_and_a_fast_wheel(joint:
 def test_a_truth_is_followed_no_tighter_than_rounding_allows(a0: float) -> None:
     """At the tolerance that is chosen steps are those of the method; one that is chosen looser would stall tighter."""
     case, reference = four_bar(0, RowLaw(a0=a0, a1=2.0 * np.sqrt(a0)), t_end=0.02), engines.load("reference")
-    found, _ = tightened(case)
+    found = followed(case).case
     coarse = reference.prepare(case, "compiled", rtol=1e-9).run().steps
     most = MANY * max(coarse, LEAST)
     assert (found.tight > case.tight) == (a0 > 1e6)
@@ -152,3 +156,34 @@ def test_a_truth_is_followed_no_tighter_than_rounding_allows(a0: float) -> None:
     if found.tight > case.tight:
         stalled = reference.prepare(case, "compiled", rtol=found.tight / 10.0, max_steps=most).run()
         assert stalled.outcome is Outcome.STEP_LIMIT
+
+
+def test_a_motion_that_takes_too_long_is_compared_as_far_as_it_is_followed() -> None:
+    """It says so, at the part of the horizon that was reached, and is the truth of the shorter horizon."""
+    case = pendulum(1.0, False, 1.0, 2000.0)
+    found = run_case(case, picks(("mujoco:matched",)), refine=False, budget=0.05)
+    reached = found.case.t_end
+    assert 0.0 < reached < 2000.0
+    assert found.truth.part == reached / 2000.0
+    (row,) = truth_row(found.case, found.truth, "")
+    assert row.compared == found.truth.part
+    assert f"Followed to {reached:.4g} s of 2000 s" in row.why
+    assert found.entries[0].run is not None
+    assert found.entries[0].run.t[-1] <= reached
+    own = followed(replace(case, t_end=reached)).motion
+    np.testing.assert_array_equal(found.truth.trajectory.q[-1], own.q[-1])
+
+
+@pytest.mark.parametrize("outcome", [Outcome.TIME_LIMIT, Outcome.STEP_LIMIT, Outcome.FINISHED])
+@given(reached=st.floats(0.0, 1.0), t_end=st.floats(1e-3, 1e3))
+def test_a_horizon_is_cut_at_two_digits_below_what_was_reached(outcome: Outcome, reached: float, t_end: float) -> None:
+    case = pendulum(1.0, False, 1.0, t_end)
+    run = engines.load("reference").prepare(replace(case, t_end=1e-6), "compiled").run()
+    until = np.array([0.0, reached * t_end])
+    found = cut_short(case, replace(run, t=until, outcome=outcome))
+    if outcome is not Outcome.TIME_LIMIT or reached * t_end < SHORTEST * t_end:
+        assert found is case
+        return
+    assert found.t_end == float(f"{found.t_end:.2g}")
+    assert 0.9 * until[-1] < found.t_end * (1.0 + 1e-12)
+    assert found.t_end <= until[-1] * (1.0 + 1e-12)

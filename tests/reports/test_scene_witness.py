@@ -58,26 +58,25 @@ def test_a_wrong_tree_is_seen(wrong: Callable[[Scene], Scene], arm: Case, monkey
     monkeypatch.setattr(tree, "system", planted)
     (row,) = truth_row(arm, judging.truth_of(arm), "")
     assert row.verdict == Word.OUTSIDE
-    monkeypatch.setattr(judging, "_witness", lambda _: "left out")  # a solver of the same equations has the same fault
+    monkeypatch.setattr(judging, "_witness", lambda *_: "left out")  # a solver of the same equations has the same fault
     (blind,) = truth_row(arm, judging.truth_of(arm), "")
     assert blind.verdict == Word.WITHIN
 
 
 def test_where_there_is_no_witness_the_truth_says_why(arm: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(judging, "WITNESS_S", 0.0)
+    monkeypatch.setattr(judging, "estimated", lambda *_: (2e4, 10))
     said = judging.truth_of(arm).source
     assert "they share the equations of the mechanism alone (Pinocchio would share the scene alone, and take" in said
 
-    monkeypatch.setattr(judging, "WITNESS_S", 40.0)
-    monkeypatch.setattr(judging, "seconds", lambda _: (1.0, 10))
+    monkeypatch.setattr(judging, "estimated", lambda *_: (1.0, 10))
     long = replace(arm, t_end=500.0)  # its first part seemed cheap: a thousand steps are all that it is given
-    assert str(judging._witness(long)).startswith("Pinocchio ends step_limit at t = ")
+    assert str(judging._witness(long, 40.0)).startswith("Pinocchio ends step_limit at t = ")
 
     def absent(_: str) -> Any:
         raise EngineUnavailable("Pinocchio is not installed.")
 
     monkeypatch.setattr("crossbody.engines.load", absent)
-    assert judging._witness(arm) == "Pinocchio is not installed"
+    assert judging._witness(arm, 40.0) == "Pinocchio is not installed"
 
 
 @pytest.mark.parametrize("seed", [pytest.param(k, marks=[pytest.mark.slow] if k > 1 else []) for k in range(8)])

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from unpacked import numbers
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome, SceneError, Trajectory, UnknownName
@@ -30,7 +31,7 @@ from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
 from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, row
 from crossbody.reports.sweep.map import MAP, stability_map, summary
-from crossbody.reports.sweep.measure import Asked, Error, error, instants
+from crossbody.reports.sweep.measure import Asked, Error, error, instants, residual
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.together import together
@@ -604,11 +605,11 @@ def test_a_map_of_engines_that_fail_has_crosses_without_a_colour(tmp_path: Path)
     )  # fmt: skip
     cells.to_json(tmp_path / "cells.json")
     for known in (cells, pd.read_json(tmp_path / "cells.json"), cells.astype(object).where(cells.notna(), None)):
-        field, failed = stress_map(known).data
-        assert list(field.x) == [1e2, 1e8]
-        np.testing.assert_allclose(np.asarray(field.marker.color, float), [-3.0, math.log10(2.0)])
-        assert list(failed.x) == [1e8, 1e10, 1e12]
-        assert "0 of 4 finished; diverged 2" in failed.text[1]
+        field, failed = stress_map(known)["data"]
+        assert list(numbers(field["x"])) == [1e2, 1e8]
+        np.testing.assert_allclose(numbers(field["marker"]["color"]), [-3.0, math.log10(2.0)])
+        assert list(numbers(failed["x"])) == [1e8, 1e10, 1e12]
+        assert "0 of 4 finished; diverged 2" in failed["text"][1]
 
 
 def test_the_colour_of_an_error_ends_where_the_scale_does() -> None:
@@ -619,8 +620,8 @@ def test_the_colour_of_an_error_ends_where_the_scale_does() -> None:
          for a0, error in ((1e2, 0.0), (1e4, 1e-6), (1e6, math.inf))],
         columns=list(MAP),
     )  # fmt: skip
-    field, _ = stress_map(cells).data
-    np.testing.assert_allclose(np.asarray(field.marker.color, float), [BEST, -6.0, WORST])
+    field, _ = stress_map(cells)["data"]
+    np.testing.assert_allclose(numbers(field["marker"]["color"]), [BEST, -6.0, WORST])
 
 
 @pytest.mark.parametrize("name", suites.names())
@@ -641,3 +642,16 @@ def test_an_account_alone_is_a_word_of_its_own() -> None:
     ended = Tried(outcome=Outcome.FINISHED.value)
     words = {text: _verdict(spec, ended, error, 1e-6, 1e-9, [])[0] for text, error in errors.items()}
     assert words == {"truth": Word.WITHIN, "account": Word.LEDGER, "wrong": Word.OUTSIDE}
+
+
+@pytest.mark.parametrize("account", ["contact", "input", "dissipated"])
+@pytest.mark.parametrize("place", [1, 25, 49])
+def test_an_account_is_as_open_as_its_worst_sample(account: str, place: int) -> None:
+    run = exact()
+    assert run.ledger is not None
+    assert residual(run) < 1e-12
+    booked = getattr(run.ledger, account).copy()
+    turned = max(float(run.energy[:, 0].max()), float(np.ptp(run.energy[:, 1])), float(np.ptp(run.ledger.contact)))
+    booked[place] += 1e-3 * turned
+    wrong = replace(run, ledger=replace(run.ledger, **{account: booked}))
+    assert residual(wrong) == pytest.approx(1e-3, rel=2e-3)

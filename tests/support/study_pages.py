@@ -31,10 +31,10 @@ def rig(folder: Path) -> tuple[str, ...]:
     return str(folder / "rig.csv"), "-m", "single_pendulum", "--columns", str(folder / "rig.toml"), "--restart", "2"
 
 
-def studies(folder: Path) -> list[Path]:
-    """Folders of gap map, frequency responses, analysis, stress, replay, identification and readers."""
+def commands(folder: Path) -> dict[str, tuple[str, ...]]:
+    """Arguments of gap map, frequency responses, analysis, stress, replay, identification and readers."""
     log = rig(folder)
-    commands = {
+    return {
         "gapmap": (*ONE, "--n", "3", "--points", "5"),
         "bode": ("soft_contact",),
         "analyse": ("delta_impulse", "--at", "z=0.4", "--bode"),
@@ -43,8 +43,13 @@ def studies(folder: Path) -> list[Path]:
         "identify": (*log, "-f", "k1"),
         "conformance": ("--feature", "armature", "-e", "mujoco"),
     }
-    for name, arguments in commands.items():
+
+
+def studies(folder: Path) -> list[Path]:
+    """Folders of these studies."""
+    asked = commands(folder)
+    for name, arguments in asked.items():
         with pytest.raises(SystemExit) as end:
             main([name, *arguments, "--quiet", "--out", str(folder / name)])
         assert not end.value.code, name
-    return [folder / name for name in commands]
+    return [folder / name for name in asked]

@@ -53,10 +53,11 @@
       return values.map((each) => each.reduce(([a, b], x) => [Math.min(a, x), Math.max(b, x)], [Infinity, -Infinity]));
     };
     const lead = tracks.find((track) => track.truth);
-    const across = (boxes) => Math.hypot(...boxes.map(([a, b]) => b - a)) * 0.8;
+    // Diameter seen from above, and height: what a camera that goes round and over it must have room for.
+    const across = ([x, y, z]) => [Math.hypot(x[1] - x[0], y[1] - y[0]), z[1] - z[0]];
     const centre = (boxes) => boxes.map(([a, b]) => (a + b) / 2);
     const range = spans();
-    let [middle, size] = [centre(range), space ? across(range) : 0];
+    let [middle, size] = [centre(range), space ? across(range) : [0, 0]];
     // What the bodies span at one instant: one that goes far is followed, or nobody would see it.
     const standing = (t) => {
       const pose = at(lead || tracks[0], t).pose;
@@ -68,7 +69,7 @@
       [middle, size] = [whole, wide];
       if (!follow?.checked) return;
       const boxes = standing(now);
-      [middle, size] = [centre(boxes), 1.3 * across(boxes)];
+      [middle, size] = [centre(boxes), across(boxes).map((x) => 1.3 * x)];
     };
     const larger = () => (differences && lead ? Number(differences.value) : 1);
     // A pose with its difference to the truth's made larger: of bodies with shapes where they are, not how they are turned.
@@ -99,8 +100,9 @@
         const scale = 0.86 * zoom * Math.min(w / wide, (h - 18) / tall);
         return (p) => [x0 + w / 2 + (p[0] - middle[0]) * scale, y0 + (h + 14) / 2 - (p[1] - middle[1]) * scale, scale];
       }
-      const scale = 0.95 * zoom * Math.min(w, h) / (size || 1);
       const [ca, sa, cb, sb] = [Math.cos(turn), Math.sin(turn), Math.cos(tilt), Math.sin(tilt)];
+      const tall = Math.abs(cb) * size[1] + Math.abs(sb) * size[0];
+      const scale = 0.9 * zoom * Math.min(w / (size[0] || 1), (h - 14) / (tall || 1));
       const up = stage.down ? -1 : 1;
       return (p) => {
         const [x, y, z] = [p[0] - middle[0], p[1] - middle[1], up * (p[2] - middle[2])];
@@ -167,7 +169,7 @@
       const look = { ink: track.color, paper: colour("--paper"), width: track.truth ? 2 : 1.4, ghost };
       crossbody.solids.paint(g, moving, frames, to, look);
       crossbody.solids.bones(g, stage.bones, frames, to);
-      if (axes.checked) crossbody.solids.axes(g, frames, to, 0.06 * size);
+      if (axes.checked) crossbody.solids.axes(g, frames, to, 0.06 * Math.hypot(...size));
     };
     const paint = (track, to, h, ghost) => {
       const { pose: posed, pushes } = pose(track, now);
@@ -208,7 +210,7 @@
       g.strokeStyle = g.fillStyle = colour("--soft");
       g.lineWidth = 1.2;
       stage.still.forEach((each) => shape(each, (p) => p, to, true));
-      for (const { plane } of stage.solids) if (plane) crossbody.solids.grid(g, plane, to, middle, size, colour("--line"));
+      for (const { plane } of stage.solids) if (plane) crossbody.solids.grid(g, plane, to, middle, Math.hypot(...size), colour("--line"));
       crossbody.solids.paint(g, fixed, [], to, { ink: colour("--soft"), paper: colour("--paper"), width: 1, ghost: false });
     };
     const bar = (to, x, y, h) => {

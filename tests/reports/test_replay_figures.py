@@ -1,0 +1,104 @@
+"""Figures of a replay and an identification show the numbers of the tables, each in its own plot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from unpacked import numbers
+
+from crossbody.reports.replay import figure
+
+NAMES = ["I1", "k1", "<b>"]
+
+
+@pytest.fixture(scope="module")
+def random() -> np.random.Generator:
+    return np.random.default_rng(7)
+
+
+def spans(shapes: list[dict], axis: str) -> dict[str, tuple[float, float]]:
+    """Grey stretches along x or y, by the axis that they lie on."""
+    return {
+        one[f"{axis}ref"]: (one[f"{axis}0"], one[f"{axis}1"]) for one in shapes if "domain" not in one[f"{axis}ref"]
+    }
+
+
+def test_a_profile_is_the_rise_of_the_cost_and_shades_its_interval(random: np.random.Generator) -> None:
+    estimates = pd.DataFrame({"name": NAMES, "unit": "kg", "low": [0.9, 1.8, 2.7], "high": [1.1, 2.2, 3.3]})
+    rows = pd.DataFrame(
+        [(name, k + 0.1 * j, 1.0 + j * j + random.uniform()) for k, name in enumerate(NAMES) for j in range(-4, 5)],
+        columns=["name", "value", "cost"],
+    )
+    drawn = figure.profile(rows, estimates)
+    for k, (name, line) in enumerate(zip(NAMES, drawn["data"], strict=True)):
+        mine, n = rows[rows["name"] == name], "" if k == 0 else str(k + 1)
+        assert (line["xaxis"], line["yaxis"]) == (f"x{n}", f"y{n}")
+        np.testing.assert_allclose(numbers(line["x"]), mine["value"])
+        np.testing.assert_allclose(numbers(line["y"]), mine["cost"] - 1.0, rtol=1e-6)
+        assert spans(drawn["layout"]["shapes"], "x")[f"x{n}"] == (estimates["low"][k], estimates["high"][k])
+        assert drawn["layout"][f"xaxis{n}"]["title"]["text"] == f"{name.replace('<', '&lt;')} [kg]"
+        assert "matches" not in drawn["layout"][f"xaxis{n}"]
+
+
+def test_the_map_of_correlations_has_every_pair_and_nothing_where_none_is_known(random: np.random.Generator) -> None:
+    known = np.corrcoef(random.standard_normal((3, 9)))
+    known[2, :2] = known[:2, 2] = np.nan
+    pairs = [(a, b, known[i, j]) for i, a in enumerate(NAMES) for j, b in enumerate(NAMES)]
+    drawn = figure.together(pd.DataFrame(pairs, columns=["name", "other", "value"]).sample(frac=1.0, random_state=1))
+    (heat,) = drawn["data"]
+    order = [NAMES.index(text.replace("&lt;", "<")) for text in heat["x"]]
+    assert heat["x"] == heat["y"]
+    assert (heat["zmin"], heat["zmax"]) == (-1.0, 1.0)
+    np.testing.assert_array_equal(np.array(heat["z"], float), known[np.ix_(order, order)])
+    assert heat["text"] == [["" if np.isnan(x) else f"{x:+.2f}" for x in row] for row in known[np.ix_(order, order)]]
+
+
+def windows(random: np.random.Generator) -> pd.DataFrame:
+    """Two engines on two channels in three windows."""
+    parts = [
+        pd.DataFrame({
+            "who": who, "channel": channel, "unit": "rad", "window": w, "t": 1.0 * w + np.linspace(0.0, 0.9, 10),
+            "measured": random.standard_normal(10), "value": random.standard_normal(10),
+        })
+        for who in ("reference:compiled", "mujoco:matched") for channel in ("th1", "th2") for w in range(3)
+    ]  # fmt: skip
+    return pd.concat(parts, ignore_index=True)
+
+
+def test_measured_and_predicted_stand_in_one_plot_with_the_band_of_noise_and_held_windows(
+    random: np.random.Generator,
+) -> None:
+    rows = windows(random)
+    drawn = figure.motion(rows, {"th1": 0.25}, held=[1])
+    for place, channel in (("", "th1"), ("2", "th2")):
+        lines = {one["name"]: one for one in drawn["data"] if one["yaxis"] == f"y{place}"}
+        assert (len(lines) == 4) == (channel == "th1")  # the band only where the noise is known
+        for who in ("reference:compiled", "mujoco:matched"):
+            mine = rows[(rows["who"] == who) & (rows["channel"] == channel)]
+            y = numbers(lines[who]["y"])
+            np.testing.assert_allclose(y[~np.isnan(y)], mine["measured"] - mine["value"], rtol=1e-5, atol=1e-6)
+            assert np.isnan(y).sum() == 2  # a gap between windows
+    band = next(one for one in drawn["data"] if one.get("fill") == "toself")
+    y = numbers(band["y"])
+    assert np.nanmax(np.abs(np.diff(y))) > 0.0
+    first = rows[(rows["who"] == "reference:compiled") & (rows["channel"] == "th1") & (rows["window"] == 0)]
+    predicted = (first["measured"] - first["value"]).to_numpy()
+    np.testing.assert_allclose(y[:10] - predicted, figure.SIGMAS * 0.25, rtol=1e-4)
+    assert set(spans(drawn["layout"]["shapes"], "x").values()) == {(1.0, 1.9)}
+
+
+def test_residuals_stand_in_the_band_of_their_own_channel(random: np.random.Generator) -> None:
+    drawn = figure.residual(windows(random), {"th1": 0.25, "th2": 0.5})
+    assert spans(drawn["layout"]["shapes"], "y") == {"y": (-0.5, 0.5), "y2": (-1.0, 1.0)}
+
+
+def test_correlations_of_residuals_stand_in_their_band(random: np.random.Generator) -> None:
+    rows = pd.DataFrame({
+        "who": "reference:compiled", "channel": "th1", "input": np.repeat(["", "tau"], 5),
+        "lag": np.tile(np.arange(5), 2),
+        "value": random.uniform(-1.0, 1.0, 10), "band": np.repeat([0.1, 0.2], 5),
+    })  # fmt: skip
+    drawn = figure.correlation(rows)
+    assert spans(drawn["layout"]["shapes"], "y") == {"y": (-0.1, 0.1), "y2": (-0.2, 0.2)}
+    np.testing.assert_allclose(numbers(drawn["data"][1]["y"]), rows["value"][5:], rtol=1e-6)
