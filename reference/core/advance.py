@@ -61,7 +61,7 @@ from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
-JAMMING = 1e-3  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
+JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
 
 
 class Kernels(NamedTuple):

@@ -26,7 +26,6 @@ from crossbody.reference.core.friction import (
     decided_to,
     has_friction,
     is_dry,
-    most_drift,
     slip,
     small_slip,
 )
@@ -43,6 +42,7 @@ AROUND, HALVINGS = 24, 50  # directions that are looked at where that leads nowh
 MOST_SETS = 256
 FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
+CLEAR_OF_A_JAM = 1e-5  # determinant, of rows of size 1, of what goes on where others jam
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 DIFFERENT = 1e-6  # part of the largest acceleration by which motions differ
@@ -571,20 +571,6 @@ def _found_beside_a_jam(s: Any, m: Model, w: Work) -> bool:
 
 
 @compiled
-def _stop_slow(s: Any, m: Model, w: Work) -> bool:
-    """Let contacts stand that slide no faster than one may drift that sticks; whether there are any.
-
-    Where no set of modes goes on their friction stops them at once.
-    """
-    found = False
-    for j in range(s.na):
-        i = w.idx[j]
-        if has_friction(m, i) and not w.stands[i] and 2.0 * slip(m, w, i, w.rate) < most_drift(s):
-            w.stands[i], found = 1, True
-    return found
-
-
-@compiled
 def _most_pull(s: Any, m: Model, w: Work) -> float:
     """The most that pulls a contact back which stands: what it moves by is an error, and so is that.
 
@@ -610,7 +596,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     _look(s, m, w)
     if not _found(s, m, w):
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
-        if not (_found(s, m, w) or (_stop_slow(s, m, w) and _found(s, m, w)) or _found_beside_a_jam(s, m, w)):
+        if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
     _hold_what_stands(s, m, w)
     _count_others(s, m, w)
@@ -665,8 +651,10 @@ def _mark(s: Any, m: Model, w: Work) -> int:
 def _jammed(s: Any, m: Model, w: Work) -> int:
     """The contact that slides and that bears most of what is jammed as the set stands; -1 if nothing is.
 
-    One that no forces bring onto its law is at the very edge of that.
+    One that no forces bring onto its law is at the very edge of that. Where contacts have just come to a jam time does
+    not tell how near: a set that is nearly there is the same again.
     """
+    least = CLEAR_OF_A_JAM if s.jam else JAMMED
     found, most, value, known = -1, -np.inf, 0.0, False
     for j in range(s.na):
         i = w.idx[j]
@@ -674,6 +662,6 @@ def _jammed(s: Any, m: Model, w: Work) -> int:
             if not (known and w.reached[j]):
                 value, known = determinant(s, m, w, j), True
             off = abs(w.excess[j]) > DIFFERENT * s.push_scale
-            if (off or not value > JAMMED) and w.la[j] > most:
+            if (off or not value > least) and w.la[j] > most:
                 found, most = int(i), w.la[j]
     return found

@@ -36,8 +36,9 @@ ROUNDS, SWEEPS = 40, 3000
 MOST_SETS = 4096
 STAYS = 1e-7  # part of the largest acceleration, below which what begins to slide goes nowhere
 WAITS = 10.0  # times as long as friction needs for a slip without a direction, after which one that goes on stands
-JAMMING = 1e-3  # likewise, where no step is short enough for forces that grow without bound
+JAMMING = 1e-2  # likewise, where no step is short enough for forces that grow without bound
 JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
+CLEAR = 1e-5  # likewise, of what goes on where others have come to a jam
 FAR = 1e6  # times what one row alone would ask for: sweeps that lead there diverge
 SETTLED = 1e-14  # part of the largest multiplier by which the last sweep changes any
 WITHIN = 1e-7  # part of its bound by which a force must stay below it to count as that of a contact that sticks
@@ -79,7 +80,7 @@ class FrictionMachine(LevelMachine):
         self.rows = sorted({*self.rows, *self.sliding.dry})
         self._joining, self._stops, self._begins = set(self.sliding.dry), set[int](), dict[int, Floats]()
         self._stopped, self._waiting = set[int](), dict[int, float]()
-        self._jump, self._rounds, self._at, self._limit = True, 0, -np.inf, 0.0
+        self._jams, self._jump, self._rounds, self._at, self._limit = False, True, 0, -np.inf, 0.0
 
     @property
     def small(self) -> float:
@@ -190,6 +191,7 @@ class FrictionMachine(LevelMachine):
                 raise Ended(Outcome.MODE_CYCLE, sorted({*self.contacts(), *joins}))
             self._decide(t, q, v, joins, gap, rate)
         self._joining, self._stops, self._stopped, self._begins, self._jump = set(), set(), set(), {}, True
+        self._jams = False
         self.redundant = self.sliding.redundant
         vd, lam = self.accelerate(t, q, v)
         self._set_alarms(t, q, v)
@@ -233,9 +235,7 @@ class FrictionMachine(LevelMachine):
 
     def _decided(self, seen: Seen, joins: set[int]) -> Tried:
         """A set of modes that agrees with its forces."""
-        found = self._consistent(seen, joins, self.small)
-        if found is None:  # what slides no faster than one may drift that sticks is stopped at once
-            found = self._consistent(seen, joins, 0.5 * STILL * self.small)
+        found = self._consistent(seen, joins)
         if found is not None:
             return found
         slips = {i: self.sliding.slip(seen, i) for i in self.sliding.ways if i in seen.at}
@@ -247,8 +247,8 @@ class FrictionMachine(LevelMachine):
         jammed = self._jammed(seen, modes, ways) if ways else []
         raise Ended(Outcome.PAINLEVE if jammed else Outcome.NO_CONSISTENT_MODES, jammed or list(modes))
 
-    def _consistent(self, seen: Seen, joins: set[int], slow: float) -> Tried | None:
-        """A set in which contacts stand that slide no faster than that, m/s, where loads jump; or None."""
+    def _consistent(self, seen: Seen, joins: set[int]) -> Tried | None:
+        """A set of modes that agrees with its forces, None if none is found."""
         contacts, ways = [i for i in seen.rows if i in self.rows], dict[int, Floats]()
         self._stands: set[int] = set()
         for i in contacts:
@@ -257,7 +257,7 @@ class FrictionMachine(LevelMachine):
             slip = self.sliding.slip(seen, i)
             size = float(np.linalg.norm(slip))
             slides = self.modes[i] == Mode.SLIP and i not in self._stops and i in self.ways
-            slides = slides and not ((self._jump or slow > self.small) and size <= slow)
+            slides = slides and not (self._jump and size <= self.small)
             if slides or (i in joins and size > STILL * self.small):
                 ways[i] = self.direction(i, slip) if slides else slip / size
             else:
@@ -383,7 +383,7 @@ class FrictionMachine(LevelMachine):
         for i in sliding.keys() - self.sliding.dry:
             values = self.sliding.jam(part, modes, sliding, i)
             real = values.real[np.abs(values.imag) <= ULP * np.abs(values)]
-            if not (real > JAMMED).all():
+            if not (real > (CLEAR if self._jams else JAMMED)).all():
                 found.append(i)
         return sorted(found)
 
@@ -554,7 +554,7 @@ class FrictionMachine(LevelMachine):
         for alarm in fired:
             i, tells = alarm.row, alarm.tells
             if tells == "JAM":
-                self._jump = True  # whether other modes go on from here is decided with all of them
+                self._jump = self._jams = True  # whether other modes go on from here is decided with all of them
             elif tells == "RELEASE":
                 self._become(t, i, Mode.FREE if gap[i] > 0.0 else Mode.BALLISTIC)
             elif tells == "LEAVE":

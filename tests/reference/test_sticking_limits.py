@@ -7,10 +7,11 @@ import pytest
 from friction_scenes import G, linear
 from scipy.optimize import minimize
 
-from crossbody.cases import Mode, Outcome
+from crossbody.cases import Mode, Outcome, Trajectory
 from crossbody.reference import simulate
 
-STARTS = 12
+STARTS = 6
+NEAR = {"compiled": 1e-3, "cvode": 0.02}  # the limit: the latter's projections take long beside it
 
 
 def plate(seed: int) -> tuple[np.ndarray, np.ndarray, float, int, np.ndarray]:
@@ -25,12 +26,15 @@ def plate(seed: int) -> tuple[np.ndarray, np.ndarray, float, int, np.ndarray]:
     return np.array(normal + along, dtype=float), rng.normal(size=3), mu, count, feet
 
 
-def limit(push: np.ndarray, mu: float, feet: np.ndarray) -> float:
-    """Return the least factor of a push (x, y, turn) at which some motion of the plate gains what friction takes."""
+def limit(push: np.ndarray, mu: float, feet: np.ndarray, loads: np.ndarray) -> float:
+    """Return the least factor of a push (x, y, turn) at which some motion of the plate gains what friction takes.
+
+    How feet that depend on each other share the weight is no law's: the loads are given.
+    """
 
     def factor(v: np.ndarray) -> float:
-        taken = np.hypot(v[0] - feet[:, 1] * v[2], v[1] + feet[:, 0] * v[2]).sum()
-        return float(mu * G / len(feet) * taken / abs(push @ v)) if abs(push @ v) > 1e-12 else np.inf
+        taken = loads @ np.hypot(v[0] - feet[:, 1] * v[2], v[1] + feet[:, 0] * v[2])
+        return float(mu * taken / abs(push @ v)) if abs(push @ v) > 1e-12 else np.inf
 
     rng, options = np.random.default_rng(0), {"xatol": 1e-12, "fatol": 1e-14, "maxiter": 8000, "maxfev": 8000}
     found = [
@@ -48,13 +52,16 @@ def limit(push: np.ndarray, mu: float, feet: np.ndarray) -> float:
 )  # fmt: skip
 def test_feet_hold_a_plate_up_to_the_load_that_moves_it(seed: int, solver: str) -> None:
     H, push, mu, count, feet = plate(seed)
-    for part in (0.98, 1.02):
-        x, y, turn = part * limit(push, mu, feet) * push
-        force = np.array([x, y, -G, 0.0, 0.0, turn])
-        found = simulate(linear(H, force, mu, count), np.zeros(6), np.zeros(6), 1e-3, rtol=1e-9, solver=solver)
+
+    def pushed(part: float) -> Trajectory:
+        x, y, turn = part * push
+        made = linear(H, np.array([x, y, -G, 0.0, 0.0, turn]), mu, count)
+        found = simulate(made, np.zeros(6), np.zeros(6), 1e-3, rtol=1e-9, solver=solver)
         assert found.outcome is Outcome.FINISHED, found.message
-        if part < 1.0:
-            assert np.abs(found.v[-1]).max() < 1e-12
-            assert set(found.mode[-1, :count]) == {Mode.STICK}
-        else:
-            assert np.abs(found.v[-1]).max() > 1e-7
+        return found
+
+    most = limit(push, mu, feet, pushed(0.0).lam[-1, :count])
+    held, moved = pushed((1.0 - NEAR[solver]) * most), pushed(1.02 * most)
+    assert np.abs(held.v[-1]).max() < 1e-12
+    assert set(held.mode[-1, :count]) == {Mode.STICK}
+    assert np.abs(moved.v[-1]).max() > 1e-7
