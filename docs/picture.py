@@ -1,16 +1,36 @@
-"""The picture of the README, from a real run: `make picture` writes docs/ball.svg."""
+"""The figures of the pages, from the commands on them: `make picture` writes docs/ball.svg and docs/figures.
+
+`python docs/picture.py rig stress` draws some. A figure is white paper, so that it is read on light and on dark pages.
+"""
 
 from __future__ import annotations
 
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import matplotlib as mpl
 import numpy as np
+import pandas as pd
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 from scipy.interpolate import CubicHermiteSpline
 
 from crossbody import cases, engines
+from crossbody.cases import Mode, installed
+from crossbody.cases.contacts import contacts
 
+DOCS = Path(__file__).parent
+FIGURES = DOCS / "figures"
+COLUMNS = 108
+"""Widest line of a picture of a terminal, characters."""
 RUNS = {
     "reference": ("reference", "compiled", "-"),
     "MuJoCo matched": ("mujoco", "matched", "--"),
@@ -18,31 +38,348 @@ RUNS = {
     "Pinocchio law": ("pinocchio", "law", (0, (4, 1, 1, 1, 1, 1))),
     "Pinocchio impulse": ("pinocchio", "impulse", ":"),
 }
+DRAWN: dict[str, Callable[[], None]] = {}
+"""Page -> what draws its figure in a folder that has the files of the page."""
 
 
-def main() -> None:
-    """Run, draw, write."""
-    mpl.rcParams["svg.hashsalt"] = "crossbody"  # the same file from the same numbers
+def drawn(draw: Callable[[], None]) -> Callable[[], None]:
+    """Have the figure of a page called like the function drawn."""
+    DRAWN[draw.__name__.replace("_", "-")] = draw
+    return draw
+
+
+def sh(*commands: str, codes: Sequence[int] = (0,)) -> str:
+    """Run commands as a reader would type them; what they print."""
+    said = ""
+    for command in commands:
+        words = shlex.split(command)
+        program = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider"] if words[0] == "pytest" else [
+            str(Path(sys.executable).with_name(words[0]))
+        ]  # fmt: skip
+        done = subprocess.run([*program, *words[1:]], capture_output=True, text=True, check=False)
+        assert done.returncode in codes, done.stderr
+        said += f"$ {command}\n{done.stdout}{done.stderr if done.returncode == 0 else ''}"
+    return re.sub(r"\S*" + re.escape(str(Path.cwd())) + "/", "", said)
+
+
+def terminal(text: str, lines: int = 40) -> None:
+    """Write what was printed as a picture."""
+    rows = [row if len(row) <= COLUMNS else f"{row[:COLUMNS]}…" for row in text.rstrip().splitlines()][:lines]
+    wide, tall = 7.25 * max(map(len, rows)) + 24, 16 * len(rows) + 20
+    told = "".join(
+        f'<tspan x="12" y="{24 + 16 * i}"{" font-weight=" + chr(34) + "bold" + chr(34) if row.startswith("$") else ""}>'
+        f"{escape(row)}</tspan>"
+        for i, row in enumerate(rows)
+    )
+    write(
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {wide:.0f} {tall}" width="{wide:.0f}" height="{tall}">'
+        f'<rect width="100%" height="100%" rx="6" fill="#f6f8fa" stroke="#d0d7de"/><text xml:space="preserve" '
+        f'font-family="ui-monospace, Menlo, Consolas, monospace" font-size="12" fill="#1f2328">{told}</text></svg>\n'
+    )
+
+
+def write(text: str) -> None:
+    """Leave the figure of this page."""
+    Path("figure.svg").write_text(text, encoding="utf-8")
+
+
+def plots(rows: int = 1, cols: int = 1, **more: object) -> tuple[plt.Figure, np.ndarray]:
+    """Open a figure of small plots."""
+    more = {"figsize": (8, 1.2 + 2.3 * rows), "layout": "constrained", "squeeze": False} | more
+    figure, axes = plt.subplots(rows, cols, **more)
+    for one in axes.ravel():
+        one.grid(alpha=0.3)
+    return figure, axes
+
+
+def save(figure: plt.Figure, to: str | Path = "figure.svg") -> None:
+    """Write a figure; the same file from the same numbers."""
+    figure.savefig(to, metadata={"Date": None})
+    plt.close(figure)
+
+
+def fine(run: cases.Trajectory, t: np.ndarray, k: int = 0) -> np.ndarray:
+    """Positions between the rows of a run."""
+    at, rows = np.unique(run.t, return_index=True)
+    return CubicHermiteSpline(at, run.q[rows, k], run.v[rows, k])(t)
+
+
+def shade(axes: Axes, run: cases.Trajectory) -> None:
+    """Shade when the first contact touches and when it flies below the surface."""
+    for k, (mode, colour) in enumerate({Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00"}.items()):
+        axes.fill_between(run.t, 0, 1, where=run.mode[:, 0] == mode, transform=axes.get_xaxis_transform(), alpha=0.2,
+                          color=colour, label=mode.name, lw=0, step="post", zorder=-k)  # fmt: skip
+
+
+def ball() -> None:
+    """Draw the bouncing ball of the first page in five engines."""
     case, reference = cases.load("bouncing_ball", t_end=2.0), engines.load("reference")
     grid = np.linspace(0.0, case.t_end, 801)
     truth = reference.prepare(case, "compiled", rtol=1e-13, samples=grid).run().q[:, 0]
-    figure, (above, below) = plt.subplots(2, sharex=True, figsize=(8, 5), height_ratios=(3, 2), layout="constrained")
+    figure, axes = plots(2, sharex=True, figsize=(8, 5), height_ratios=(3, 2))
+    above, below = axes[:, 0]
     for label, (engine, profile, dash) in RUNS.items():
         if engine == "reference":
             height = reference.prepare(case, profile, samples=grid).run().q[:, 0]
         else:
-            run = engines.load(engine).prepare(case, profile).run()
-            t, rows = np.unique(run.t, return_index=True)
-            height = CubicHermiteSpline(t, run.q[rows, 0], run.v[rows, 0])(grid)
+            height = fine(engines.load(engine).prepare(case, profile).run(), grid)
         above.plot(grid, height, linestyle=dash, label=label)
         below.semilogy(grid, np.maximum(np.abs(height - truth), 1e-16), linestyle=dash)
     above.set(ylabel="height [m]", title="One bouncing ball, the same law asked of every engine")
     below.set(ylabel="|height - truth| [m]", xlabel="time [s]", ylim=(1e-14, 3.0))
     above.legend(frameon=False)
-    for axes in (above, below):
-        axes.grid(alpha=0.3)
-    figure.savefig(Path(__file__).with_name("ball.svg"), metadata={"Date": None})
+    save(figure, DOCS / "ball.svg")
+
+
+@drawn
+def tutorial() -> None:
+    """Height and force of the first bounce, and its modes."""
+    case = cases.load("bouncing_ball", "linear", t_end=0.6)
+    run = engines.load("reference").prepare(case, samples=np.linspace(0.44, 0.5, 240)).run()
+    figure, axes = plots(2, sharex=True)
+    for one, values, name in zip(
+        axes[:, 0], (run.q[:, 0], run.lam[:, 0]), ("height [m]", "force lam [N]"), strict=True
+    ):
+        one.plot(run.t, values, color="black", lw=1.2)
+        one.set(ylabel=name)
+        shade(one, run)
+    axes[0, 0].legend(frameon=False, loc="upper center")
+    axes[1, 0].set(xlabel="time [s]")
+    save(figure)
+
+
+@drawn
+def robot_file() -> None:
+    """The cart, drawn by the command itself."""
+    sh("crossbody run cart.py --variant short -e reference:compiled --out cart -q",
+       "crossbody picture cart cart.svg --at 0.35 -q")  # fmt: skip
+    write(Path("cart.svg").read_text(encoding="utf-8"))
+
+
+@drawn
+def report() -> None:
+    """The ball in its first contact, drawn by the command itself."""
+    sh("crossbody run bouncing_ball --variant linear -e reference:compiled --out ball -q",
+       "crossbody picture ball ball.svg --at 0.46 -q")  # fmt: skip
+    write(Path("ball.svg").read_text(encoding="utf-8"))
+
+
+@drawn
+def audit() -> None:
+    """What the command prints of a file that one reader takes for another robot."""
+    terminal(sh("crossbody audit arm.xml -e mujoco -e pinocchio", codes=(1,)))
+
+
+@drawn
+def outside() -> None:
+    """What a run prints that is outside."""
+    terminal(
+        sh("crossbody run bouncing_ball --variant linear -e reference:compiled --rtol 1e-3 --out ball", codes=(1,))
+    )
+
+
+@drawn
+def pytest() -> None:
+    """One test for every limit."""
+    Path("test_ball.py").unlink()  # which stands on the page too
+    terminal(
+        sh("pytest --crossbody-case bouncing_ball:linear --crossbody-engine reference:compiled -v --no-header"), 24
+    )
+
+
+@drawn
+def ci() -> None:
+    """What a run prints in the log of a CI."""
+    terminal(sh("crossbody run bouncing_ball --variant linear -e reference:compiled -e mujoco --out report"))
+
+
+@drawn
+def log_format() -> None:
+    """What is seen in a log of the new format."""
+    t = np.arange(500) * 1e-3
+    np.savez("swing.npz", t=t, angle=np.rad2deg(np.sin(t)))
+    terminal(sh("crossbody log info swing.npz --columns swing.toml --plugin npz.py"))
+
+
+@drawn
+def cache() -> None:
+    """The first run of an installation, and the next one."""
+    os.environ["CROSSBODY_CACHE"] = "cache"
+    run = "crossbody run bouncing_ball --variant listing -e reference:compiled --out ball -q"
+    try:
+        terminal(sh(run, "crossbody cache", run))
+    finally:
+        del os.environ["CROSSBODY_CACHE"]
+
+
+@drawn
+def case() -> None:
+    """The pendulum at its wall."""
+    run = engines.load("reference").prepare(cases.load("wall_pendulum.py"), samples=np.linspace(0, 2, 500)).run()
+    figure, axes = plots(2, sharex=True)
+    for one, values, name in zip(
+        axes[:, 0], (run.q[:, 0], run.lam[:, 0]), ("angle [rad]", "force lam [N]"), strict=True
+    ):
+        one.plot(run.t, values, color="black", lw=1.2)
+        one.set(ylabel=name)
+    axes[1, 0].set(xlabel="time [s]")
+    save(figure)
+
+
+@drawn
+def engine() -> None:
+    """Errors of Euler's method at two steps."""
+    installed.use(["euler.py"])
+    linear = cases.load("bouncing_ball", variant="linear")
+    grid = np.linspace(0.0, linear.t_end, 400)
+    truth = engines.load("reference").prepare(linear, rtol=1e-13, samples=grid).run().q[:, 0]
+    figure, axes = plots()
+    for dt, dash in ((1e-3, "-"), (1e-4, "--"), (1e-5, ":")):
+        run = engines.load("euler").prepare(linear, dt=dt).run()
+        axes[0, 0].semilogy(
+            grid, np.maximum(np.abs(np.interp(grid, run.t, run.q[:, 0]) - truth), 1e-8), dash, label=f"dt = {dt:g} s"
+        )
+    axes[0, 0].set(xlabel="time [s]", ylabel="|height - truth| [m]")
+    axes[0, 0].legend(frameon=False)
+    save(figure)
+
+
+@drawn
+def metric() -> None:
+    """What the metric measures."""
+    linear = cases.load("bouncing_ball", variant="linear", t_end=1.2)
+    figure, axes = plots()
+    for name, profile, dash in (("reference", "compiled", "-"), ("mujoco", "default", "--")):
+        run = engines.load(name).prepare(linear, profile).run()
+        grid = np.linspace(0.0, run.t[-1], 500)
+        height = fine(run, grid)
+        (line,) = axes[0, 0].plot(grid, height, dash, label=f"{name}:{profile}")
+        rebound = float(np.max(height[grid > contacts(run)[0].touch]))
+        axes[0, 0].axhline(rebound, color=line.get_color(), lw=0.8, ls=":")
+    axes[0, 0].set(xlabel="time [s]", ylabel="height [m]")
+    axes[0, 0].legend(frameon=False)
+    save(figure)
+
+
+@drawn
+def work_precision() -> None:
+    """The diagram of two engines."""
+    bench = "crossbody bench bouncing_ball --variant listing"
+    sh(f"{bench} -e reference:compiled -e mujoco:matched --repeats 2 --out bench -q")
+    rows = pd.read_parquet("bench/bench.parquet")
+    figure, axes = plots(figsize=(8, 4))
+    for (name, profile), line in rows.groupby(["engine", "profile"], sort=False):
+        axes[0, 0].loglog(line["error"], line["median_ms"], "o-", label=f"{name}:{profile}", ms=4)
+    axes[0, 0].set(xlabel="relative error of position and event times", ylabel="run time, median [ms]")
+    axes[0, 0].legend(frameon=False)
+    save(figure)
+
+
+@drawn
+def stress() -> None:
+    """Errors of the suite of the page."""
+    sh("crossbody stress slopes.py --runs 120 --jobs 1 -e reference:compiled --out slopes -q")
+    rows = pd.read_parquet("slopes/stress.parquet")
+    told = pd.DataFrame([json.loads(text) for text in rows["parameters"]])
+    figure, axes = plots()
+    for stiffness, mark in zip(sorted(told["a0"].unique(), key=float), "osv", strict=True):
+        mine = (told["a0"] == stiffness).to_numpy()
+        axes[0, 0].semilogy(
+            told["height"][mine].astype(float),
+            rows["error"][mine].astype(float),
+            mark,
+            ms=4,
+            label=f"a0 = {float(stiffness):g} 1/s²",
+        )
+    axes[0, 0].set(xlabel="height [m]", ylabel="relative error")
+    axes[0, 0].legend(frameon=False)
+    save(figure)
+
+
+@drawn
+def rig() -> None:
+    """Measured, and predicted before and after identification."""
+    page = (DOCS / "how-to" / "rig.md").read_text(encoding="utf-8")
+    scope: dict[str, object] = {}
+    for text in re.findall(r"^```python\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)[:3]:
+        exec(text, scope)
+    from crossbody import hw
+
+    log, fit = scope["log"], scope["fit"]
+    figure, axes = plots(2, sharex=True, height_ratios=(2, 1))
+    for name, parameters, dash in (("at the start", None, "--"), ("identified", fit.parameters, "-")):
+        found = hw.replay(log, "single_pendulum", restart=2.0, parameters=parameters)
+        colour, at = ("C0" if parameters else "C1"), slice(None, None, 10)
+        for k, (window, y) in enumerate(zip(found.windows, found.predictions[0].y, strict=True)):
+            axes[0, 0].plot(window.t[at], y[at, 0], dash, color=colour, label=name if k == 0 else None, lw=1.2)
+            axes[1, 0].plot(window.t[at], (window.y[:, 0] - y[:, 0])[at], dash, color=colour, lw=0.8)
+    for k, window in enumerate(found.windows):
+        label = "measured" if k == 0 else None
+        axes[0, 0].plot(window.t[::20], window.y[::20, 0], ".", color="black", ms=3, label=label)
+    axes[0, 0].set(ylabel="th1 [rad]")
+    axes[1, 0].set(ylabel="measured - predicted [rad]", xlabel="time [s]")
+    axes[0, 0].legend(frameon=False, ncols=3)
+    save(figure)
+
+
+@drawn
+def analyse() -> None:
+    """Poles of the soft fingers over the gain of their loop."""
+    sh("crossbody analyse soft_contact --locus kstar=500..700 --out fingers -q")
+    rows = pd.read_parquet("fingers/analysis-locus.parquet")
+    figure, axes = plots(figsize=(8, 4))
+    for place, mine in rows.groupby("place", sort=False):
+        near = mine[mine["real"].between(-12.0, 10.0)][::6]
+        axes[0, 0].plot(near["real"], near["imag"], ".", ms=4, label=str(place))
+    axes[0, 0].axvline(0.0, color="black", lw=0.8)
+    axes[0, 0].set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]", xlim=(-12.0, 10.0))
+    axes[0, 0].legend(frameon=False)
+    save(figure)
+
+
+@drawn
+def model() -> None:
+    """Force over depth of one contact at three dampings."""
+    figure, axes = plots(figsize=(8, 3.5))
+    for a1, dash in ((0.0, "-"), (20.0, "--"), (100.0, "-.")):
+        one = cases.load("bouncing_ball", "linear", a1=a1, t_end=0.6)
+        run = engines.load("reference").prepare(one, samples=np.linspace(0.44, 0.52, 600)).run()
+        bears = run.lam[:, 0] > 0.0
+        axes[0, 0].plot(-1e3 * run.gap[bears, 0], run.lam[bears, 0], dash, label=f"a1 = {a1:g} 1/s")
+    axes[0, 0].set(xlabel="depth [mm]", ylabel="force lam [N]")
+    axes[0, 0].legend(frameon=False)
+    save(figure)
+
+
+def draw(name: str) -> None:
+    """Draw the figure of one page in a folder of its own."""
+    if name == "ball":
+        return ball()
+    (page,) = DOCS.rglob(f"{name}.md")
+    back = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            for title, text in re.findall(
+                r'^```\w+ title="([^"]+)"\n(.*?)^```$', page.read_text(), re.DOTALL | re.MULTILINE
+            ):
+                if title != "pyproject.toml":
+                    Path(title).write_text(text, encoding="utf-8")
+            DRAWN[name]()
+            FIGURES.mkdir(exist_ok=True)
+            (FIGURES / f"{name}.svg").write_bytes(Path("figure.svg").read_bytes())
+        finally:
+            os.chdir(back)
+    return None
 
 
 if __name__ == "__main__":
-    main()
+    mpl.rcParams |= {
+        "svg.hashsalt": "crossbody",
+        "svg.fonttype": "none",
+        "font.size": 9.0,
+        "path.simplify_threshold": 0.5,
+    }
+    for each in sys.argv[1:] or ["ball", *DRAWN]:
+        draw(each)
+        print(each, flush=True)

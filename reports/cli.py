@@ -100,7 +100,10 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     if dry:
         words = ("names", "wanted", "variant", "pairs", "settings")
         return _do("planned.tell", **{name: asked[name] for name in words})
-    return _do("run.run", **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
+    from crossbody.reports.runs import choice  # wrong words are told before all else is imported
+
+    cases = choice.load_cases(asked["names"], asked.pop("variant"), choice.parse_settings(asked["pairs"]))
+    return _do("run.run", cases, **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
 
 
 @cli.command()

@@ -53,6 +53,19 @@ def test_every_command_is_in_the_reference() -> None:
     assert named == set(cli.commands)
 
 
+def test_every_how_to_page_has_its_figure_and_the_command_that_draws_it() -> None:
+    source = (DOCS / "picture.py").read_text(encoding="utf-8")
+    drawn = {name.replace("_", "-") for name in re.findall(r"^@drawn\ndef (\w+)", source, re.MULTILINE)}
+    assert drawn == {path.stem for path in (DOCS / "figures").iterdir()}
+    assert drawn >= {path.stem for path in (DOCS / "how-to").glob("*.md")}
+    for name in drawn:
+        (page,) = DOCS.rglob(f"{name}.md")
+        text = page.read_text(encoding="utf-8")
+        assert re.search(rf"!\[[^]]+\]\((\.\./)?figures/{name}\.svg\)", text), name
+        assert f"Drawn by `python docs/picture.py {name}`." in text
+        assert (DOCS / "figures" / f"{name}.svg").stat().st_size < 60_000
+
+
 @pytest.mark.parametrize("page", RUN)
 def test_every_block_runs(
     page: str, own_plugins: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

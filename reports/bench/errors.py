@@ -15,7 +15,7 @@ from crossbody.cases.scene_contacts import frictional
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import law_of, truth_of
 from crossbody.reports.measuring.truth import Truth
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 
 GRID = 2001
 """Instants at which all engines are compared alike."""

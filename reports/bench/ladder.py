@@ -9,7 +9,7 @@ from typing import Any
 
 from crossbody import engines
 from crossbody.cases import Case, InvalidValue
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 
 LADDERS = {
     "rtol": (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13),

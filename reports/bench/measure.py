@@ -25,7 +25,8 @@ from crossbody.reports.bench.order import orders
 from crossbody.reports.judging.comparison import crash
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import watch
-from crossbody.reports.runs.jobs import Pick, of_case, of_start
+from crossbody.reports.runs.choice import Pick, of_case
+from crossbody.reports.runs.jobs import of_start
 
 COLUMNS = (
     "case", "engine", "profile", "against", "tier", "known_to", "knob", "setting", "error", *PARTS, "touches",

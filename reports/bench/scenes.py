@@ -10,9 +10,9 @@ from types import MappingProxyType
 from crossbody import cases, engines
 from crossbody.cases import Case, Value
 from crossbody.reports.bench.ladder import Effort
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice
 
-ENGINES = (*jobs.DEFAULT_ENGINES, "exudyn", "drake", "dart", "pymunk")
+ENGINES = (*choice.DEFAULT_ENGINES, "exudyn", "drake", "dart", "pymunk")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,7 @@ def chosen(names: Sequence[str], variant: str | None, given: Mapping[str, Value]
     """The cases that were named, in the variant that was, else the default ones."""
     if not (names or variant or given):
         return default(full)
-    return tuple(labelled(case, given) for case in jobs.load_cases(names, variant, given))
+    return tuple(labelled(case, given) for case in choice.load_cases(names, variant, given))
 
 
 def effort(full: bool, every_rung: bool, repeats: int | None, each: float = math.inf) -> Effort:
@@ -88,7 +88,7 @@ def effort(full: bool, every_rung: bool, repeats: int | None, each: float = math
     return chosen if repeats is None else replace(chosen, repeats=repeats)
 
 
-def picks(wanted: Sequence[str]) -> tuple[jobs.Pick, ...]:
+def picks(wanted: Sequence[str]) -> tuple[choice.Pick, ...]:
     """What was asked for, else every engine that is known, installed or not."""
     known = engines.names()
-    return jobs.picks(wanted or [name for name in ENGINES if name in known])
+    return choice.picks(wanted or [name for name in ENGINES if name in known])

@@ -19,7 +19,7 @@ from crossbody.reports.analysis.loci import Family, limits, root_locus
 from crossbody.reports.analysis.places import places
 from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
-from crossbody.reports.runs import jobs, output
+from crossbody.reports.runs import choice, output
 from crossbody.reports.runs.provenance import provenance
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def parse_place(pairs: Sequence[str]) -> dict[str, float]:
     Raises:
         InvalidValue: for what is not a number.
     """
-    found = jobs.parse_settings(pairs)
+    found = choice.parse_settings(pairs)
     for name, value in found.items():
         if isinstance(value, str):
             raise InvalidValue(f"--at {name} is {value!r}; it must be a number.")
@@ -88,7 +88,7 @@ def analyse(
     Raises:
         CrossbodyError: for wrong use, before anything is written.
     """
-    overrides, place = jobs.parse_settings(pairs), parse_place(at)
+    overrides, place = choice.parse_settings(pairs), parse_place(at)
     case = cases.load(name, variant, **overrides)
     found = places(case, place)
     engines, engine_poles = counterparts(found)
@@ -129,7 +129,7 @@ def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
         CrossbodyError: for wrong use, before anything is written.
     """
     curves.check(name)
-    parameters = jobs.parse_settings(pairs)
+    parameters = choice.parse_settings(pairs)
     if "kstar" in parameters:
         raise InvalidValue(f"kstar is what the curves differ in: {', '.join(f'{k:g}' for k in curves.GAINS)}.")
     output.check(out, "bode")

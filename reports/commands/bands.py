@@ -11,7 +11,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import Entry, measured
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 NEAR = (0.7, 1.4)
 """Tolerances of the runs beside a stored one, over its own: how far one run of adaptive steps is off is chance, and
@@ -20,8 +20,8 @@ moves tenfold with the last digit; the largest of three does not."""
 
 def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations]]:
     """What all engines that are installed give on one variant, and the largest of it near their tolerances."""
-    (case,) = jobs.load_cases([name], variant, {})
-    wanted = jobs.picks(engines.names())
+    (case,) = choice.load_cases([name], variant, {})
+    wanted = choice.picks(engines.names())
     result = jobs.run_case(case, wanted, tell=print, refine=False)
     runs = [one for one in result.entries if one.run]
     found: dict[tuple[str, str], stored.Deviations] = {

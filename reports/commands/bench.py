@@ -15,7 +15,7 @@ from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
 from crossbody.reports.commands.shared import identity, key, publish, where
-from crossbody.reports.runs import files, jobs, output
+from crossbody.reports.runs import choice, files, output
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -40,7 +40,7 @@ def run(
     Raises:
         CrossbodyError: for wrong use, before anything is run.
     """
-    cases, picks = scenes.chosen(names, variant, jobs.parse_settings(pairs), full), scenes.picks(wanted)
+    cases, picks = scenes.chosen(names, variant, choice.parse_settings(pairs), full), scenes.picks(wanted)
     base = None if against is None else bench_against.read(against)
     if base is not None:
         bench_against.check_common(base[0], [case.label for case in cases])

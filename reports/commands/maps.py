@@ -9,7 +9,7 @@ from crossbody import engines
 from crossbody.reports import voice
 from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.maps import gapmap, stability
-from crossbody.reports.runs import jobs, output
+from crossbody.reports.runs import choice, output
 from crossbody.reports.runs.provenance import provenance
 
 GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
@@ -17,7 +17,7 @@ GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
 
 def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
     """Run the sliders over all gaps; writes the table and the page."""
-    picks = jobs.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
+    picks = choice.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
     output.check(out, "gapmap")
     with voice.progress(len(counts) * len(gapmap.lines(picks))) as tell:
         rows = gapmap.gap_map(counts, picks, points, tell)
@@ -33,7 +33,7 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
 
 def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     """Run the closed-loop maze with one thing changed at a time; writes the table and the page."""
-    picks = jobs.picks(wanted) if wanted else (stability.DEFAULT,)
+    picks = choice.picks(wanted) if wanted else (stability.DEFAULT,)
     output.check(out, "stability")
     with voice.progress(len(picks) * len(stability.POINTS)) as tell:
         rows = stability.stability_map(picks, stability.POINTS, tell)

@@ -20,8 +20,8 @@ from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison as replay
 from crossbody.reports.replay import kept, limits
-from crossbody.reports.runs import jobs, output, study, watch
-from crossbody.reports.runs.jobs import DEFAULT_ENGINES
+from crossbody.reports.runs import choice, output, study, watch
+from crossbody.reports.runs.choice import DEFAULT_ENGINES
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 
@@ -94,7 +94,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
             watch.limited(text, limit)
 
         found = hw.replay(
-            log, ask.model, kind=kind, wanted=engines, parameters=jobs.parse_settings(ask.pairs), restart=ask.restart,
+            log, ask.model, kind=kind, wanted=engines, parameters=choice.parse_settings(ask.pairs), restart=ask.restart,
             horizon=ask.horizon, delay=ask.delay, tell=tell, keep=kept.keeper(parts),
         )  # fmt: skip
         watch.unlimited()
@@ -142,7 +142,7 @@ def run_identify(
     model = hw.models.load(ask.model)
     output.check(out, "identify")
     asked = limits.parse(ask.limits)
-    log, given = ask.log(), jobs.parse_settings(ask.pairs)
+    log, given = ask.log(), choice.parse_settings(ask.pairs)
     label = f"{ask.model} identified from {ask.path}"
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label}: {why}")

@@ -20,7 +20,7 @@ from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Row, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results, site
-from crossbody.reports.runs import files, jobs, output, store, study, watch
+from crossbody.reports.runs import choice, files, jobs, output, store, study, watch
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -28,27 +28,26 @@ from crossbody.reports.voice import progress
 
 
 def run(
-    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], out: Path,
+    cases: Sequence[Case], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str], out: Path,
     rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
     limit: float = LIMIT, strict: bool = False, at_once: int = 1, budget: float = BUDGET,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
-    `against` is the folder of an earlier run, which may be `out` itself; `others` those of studies beside this one;
-    `limit` is the time that an engine may take for one case, s; `strict` makes a number wrong that left its
-    regression band; `at_once` is how many cases are run at once, in processes of their own; `budget` is how long the
-    tightest run of a scene may take, s.
+    `cases` are those of `names`, with the parameters of `pairs`; `against` is the folder of an earlier run, which may
+    be `out` itself; `others` those of studies beside this one; `limit` is the time that an engine may take for one
+    case, s; `strict` makes a number wrong that left its regression band; `at_once` is how many cases are run at once,
+    in processes of their own; `budget` is how long the tightest run of a scene may take, s.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.
     """
     if rtol is not None and not 1e-14 <= rtol <= 1e-1:
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
-    cases = jobs.load_cases(names, variant, jobs.parse_settings(pairs))
     for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
         click.echo(voice.folded(f"note: {sentence}"), err=True)
-    picks, asked = jobs.picks(wanted), jobs.parse_settings(settings, "--set-engine")
-    jobs.check_asked(asked, picks)
+    picks, asked = choice.picks(wanted), choice.parse_settings(settings, "--set-engine")
+    choice.check_asked(asked, picks)
     output.check(out, "run")
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)

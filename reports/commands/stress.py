@@ -15,7 +15,7 @@ from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports import suites, voice
 from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
-from crossbody.reports.runs import jobs, watch
+from crossbody.reports.runs import choice, watch
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.suites.contract import Suite
 from crossbody.reports.sweep import draw, pools
@@ -80,12 +80,12 @@ def plan(ask: Ask) -> list[Spec]:
     if ask.runs is not None and ask.runs < 1:
         raise InvalidValue(f"--runs is {ask.runs}; a sweep needs at least 1.")
     names = list(dict.fromkeys(ask.names or suites.names()))
-    fixed = jobs.parse_settings(ask.pairs, "--set")
+    fixed = choice.parse_settings(ask.pairs, "--set")
     chosen: list[tuple[str, Suite]] = [(name, suites.load(name, fixed)) for name in names]
     for name, suite in chosen:
         draw.check(name, suite)
-    given = jobs.picks(ask.wanted) if ask.wanted else None
-    picks = {name: given or jobs.picks(suite.engines) for name, suite in chosen}
+    given = choice.picks(ask.wanted) if ask.wanted else None
+    picks = {name: given or choice.picks(suite.engines) for name, suite in chosen}
     return draw.specs(chosen, picks, ask.runs, ask.seed, share=given is None)
 
 

@@ -19,7 +19,7 @@ class Written(Protocol):
 
 
 Figure: TypeAlias = dict[str, Any]
-"""Data and layout as plain values for plotly.js, of traces in x and y (its bundle `cartesian`)."""
+"""Data and layout as plain values for plotly.js."""
 
 
 class Kind(StrEnum):

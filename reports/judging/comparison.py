@@ -284,7 +284,7 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
 
 
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
-    """Metric -> deviation of every judged number of a run, to be stored; NaN for one that it does not have.
+    """Metric -> deviation of every number of a run, judged or not, to be stored; NaN for one that it does not have.
 
     The audit is stored beside them and does not stand before them: what is known of an engine is not known yet.
     """
@@ -294,7 +294,6 @@ def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
         row.metric: deviation(row.value, claims.get(row.metric))
         for row in rows
         if row.metric not in ("finished", "settings", "audit", *PART_ROWS)
-        and not (math.isnan(row.limit) and not math.isnan(row.value))
     }
     return found | {f"audit {row.quantity}": row.difference for row in entry.audit if not row.ok}
 

@@ -1,7 +1,7 @@
 """What a run of this version gave: the size of every known deviation, and the band in which numbers stay.
 
 `stored.json` beside this file is made by one command (`make bands`) and committed; it holds the deviation of every
-judged number from what is claimed, by case and variant, engine and profile, to three digits.
+number from what is claimed, by case and variant, engine and profile, to three digits.
 """
 
 from __future__ import annotations

@@ -103,7 +103,8 @@ def sentence(runs: Sequence[EngineRun]) -> str:
 
 
 def _part(row: Row) -> str:
-    return f"{row['compared']:.2g} of the horizon"
+    long = " (more takes longer than --budget allows)" if "--budget" in row["why"] else ""
+    return f"{row['compared']:.2g} of the horizon{long}"
 
 
 def _named(texts: Sequence[str]) -> str:

@@ -161,10 +161,13 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
 
 
 def band(stored: float | None, limit: Limit | None, claim: Claim | None = None) -> float:
-    """Largest deviation that is no regression; NaN without a stored run, 0 for what must come out exactly."""
+    """Largest deviation that is no regression; NaN without a stored run, 0 for what must come out exactly.
+
+    What nobody judges has one too: it is seen to move, if no one can say that it is wrong.
+    """
     if stored is None or not math.isfinite(stored):
         return math.nan
-    exact = limit is None or limit.value == 0.0
+    exact = claim is not None if limit is None else limit.value == 0.0
     size = 1.0 if claim is None else max(1.0, abs(claim.expected))
     return BAND * stored if exact else max(BAND * stored, ROUNDING * size)
 

@@ -20,7 +20,7 @@ from crossbody.cases.contacts import CLOSED
 from crossbody.cases.mechanisms.cradle.metrics import distance, row
 from crossbody.cases.mechanisms.cradle.rules import RULES
 from crossbody.reports.measuring.switching import made
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 
 LARGEST_S = 3.0
 MACHINES = ("level", "memoryless")

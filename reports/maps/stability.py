@@ -18,7 +18,7 @@ import pandas as pd
 from crossbody import cases, engines
 from crossbody.cases import Case, Trajectory, Value
 from crossbody.cases.mechanisms.maze.metrics import ring_changes
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 
 COLUMNS = (
     "engine", "profile", "change", "scene", "expected", "arrived", "outcome", "ended", "arrival", "changes", "wall_ms",

@@ -16,6 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from crossbody.cases import OutputError
 from crossbody.reports.figures.section import Column, Figure, Kind, Section, Table, Written
 from crossbody.reports.pages.packing import packed_text, packed_value
 
@@ -141,7 +142,12 @@ def _drawn(page: Page) -> bool:
 
 @cache
 def _text(name: str) -> str:
-    return (TEMPLATES / name).read_text(encoding="utf-8")
+    try:
+        return (TEMPLATES / name).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise OutputError(
+            f"{TEMPLATES / name} is not there; installing crossbody (pip install) puts it there."
+        ) from None
 
 
 @cache

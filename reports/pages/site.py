@@ -24,7 +24,7 @@ from crossbody.reports.runs.study import read_json
 
 INDEX = "index"
 PAGE = f"{INDEX}.html"
-FULL = 6.0
+FULL = 2.25
 """Cases whose plots have their usual room in a single file; those of more share it."""
 
 

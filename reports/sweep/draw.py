@@ -16,7 +16,7 @@ from scipy.stats import qmc
 
 from crossbody.cases import InvalidValue, UnknownName, Value
 from crossbody.cases.loading import module
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 from crossbody.reports.suites.contract import Family, Suite
 from crossbody.reports.sweep.spec import Spec
 

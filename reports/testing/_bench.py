@@ -18,7 +18,7 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Verdict
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import jobs
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 from crossbody.reports.testing._parameters import Scene
 
 _Made = TypeVar("_Made")

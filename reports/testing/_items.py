@@ -11,7 +11,7 @@ import pytest
 from crossbody.cases import Case, CrossbodyError
 from crossbody.cases.defaults import limits_of
 from crossbody.reports.judging.verdict import Verdict, Word
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 from crossbody.reports.testing import plugin
 from crossbody.reports.testing._bench import Bench
 from crossbody.reports.testing._parameters import Named, Scene, picks, scenes

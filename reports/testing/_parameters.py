@@ -12,8 +12,8 @@ import pytest
 from crossbody import cases
 from crossbody.cases import CrossbodyError
 from crossbody.cases.loading import parted
-from crossbody.reports.runs import jobs
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs import choice
+from crossbody.reports.runs.choice import Pick
 
 NONE = (
     "No case is named: use --crossbody-case CASE, crossbody_cases in the configuration, or the mark "
@@ -66,7 +66,7 @@ def picks(config: pytest.Config, mark: pytest.Mark | None = None) -> list[Named]
     """
     texts = mark.kwargs.get("engines", ()) if mark is not None else ()
     try:
-        return [Named(pick) for pick in jobs.picks(texts or _asked(config, "engine"))]
+        return [Named(pick) for pick in choice.picks(texts or _asked(config, "engine"))]
     except CrossbodyError as error:
         raise pytest.Collector.CollectError(str(error)) from None
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory
     from crossbody.reports.judging.verdict import Verdict
     from crossbody.reports.measuring.truth import Truth
-    from crossbody.reports.runs.jobs import Pick
+    from crossbody.reports.runs.choice import Pick
     from crossbody.reports.testing._baseline import Baseline
     from crossbody.reports.testing._bench import Bench, Chosen
     from crossbody.reports.testing._parameters import Named, Scene

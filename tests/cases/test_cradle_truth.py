@@ -16,7 +16,7 @@ from crossbody.cases.mechanisms.cradle.scene import Row
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.measuring.truth import from_run, sample_times
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 ONE = Row(masses=np.full(5, 0.1), lifted=1, speed=1.0, gap=0.0, a0=1e6, zeta=0.0)
 THREE = replace(ONE, masses=np.ones(3))
@@ -198,7 +198,7 @@ def test_every_solver_meets_the_closed_form_of_any_damped_row(solver: str, seeds
 
 def test_balls_that_do_not_touch_are_not_held_against_those_that_do() -> None:
     case = load("newtons_cradle", "sliders", n=3, lifted=2, zeta=0.2, gap=1e-3, collisions="simultaneous")
-    found = jobs.run_case(case, jobs.picks(("reference:compiled",)), refine=False)
+    found = jobs.run_case(case, choice.picks(("reference:compiled",)), refine=False)
     assert [row.metric for row in judged(case, found.entries, found.truth, "") if row.verdict == "outside"] == []
 
 

@@ -10,7 +10,7 @@ import pytest
 from crossbody import cases
 from crossbody.cases import InvalidValue, UnknownName
 from crossbody.cases.parameters import NumberOrWord, Numbers, spread
-from crossbody.reports.runs.jobs import load_cases, parse_settings
+from crossbody.reports.runs.choice import load_cases, parse_settings
 
 MASSES = Numbers(default="0.1", unit="kg", low=0.0, open_low=True)
 HORIZON = NumberOrWord(default="auto", unit="s", low=0.0, open_low=True, choices=("auto",))

@@ -29,7 +29,7 @@ from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
 from crossbody.reports.metrics.position import scale_of
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",
              "universal_robots_ur5e/ur5e")  # fmt: skip
@@ -762,7 +762,7 @@ def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
 ) -> None:
     case = cases.from_file(write(tmp_path), "raised")
     monkeypatch.setattr(jobs, "DEAR", 0.0)
-    wanted = [next(iter(jobs.picks([name]))) for name in ("pinocchio", "pinocchio:law")]
+    wanted = [next(iter(choice.picks([name]))) for name in ("pinocchio", "pinocchio:law")]
     every, asked = jobs.run_case(case, wanted).entries
     assert every.run is None
     assert "Too dear: it would take about" in every.skipped
@@ -774,7 +774,7 @@ def test_an_engine_that_would_take_too_long_says_so_before_it_starts(
 def test_a_run_that_seemed_cheap_and_is_not_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jobs, "DEAR", 1e-9)
     monkeypatch.setattr(jobs, "estimated", lambda *_: (0.0, 1))
-    wanted = jobs.picks(["reference"])
+    wanted = choice.picks(["reference"])
     ours, *others = jobs.run_case(cases.from_file(write(tmp_path), "raised"), wanted).entries
     assert ours.run is not None
     assert ours.run.outcome is Outcome.FINISHED
@@ -787,9 +787,9 @@ def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path
     assert "as_is" in str(engine.why_not(case, "default"))
     assert "default" in str(engine.why_not(shipped, "as_is"))
     for one, profiles in ((case, {"matched", "as_is"}), (shipped, {"matched", "default"})):
-        assert {jobs.of_case(pick, one).profile for pick in jobs.picks(["mujoco"])} == profiles
-    asked = jobs.picks(["mujoco:default"])[0]
-    assert jobs.of_case(asked, case).profile == "default"
+        assert {choice.of_case(pick, one).profile for pick in choice.picks(["mujoco"])} == profiles
+    asked = choice.picks(["mujoco:default"])[0]
+    assert choice.of_case(asked, case).profile == "default"
 
 
 SERVO = """

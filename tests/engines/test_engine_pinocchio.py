@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from random_scenes import random_scene, random_state
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Outcome
@@ -233,3 +234,19 @@ def test_start_below_the_surface_going_up_is_not_struck() -> None:
     found = run(ball("linear", height=-0.01, speed=-1.0, gravity=0.0, t_end=0.1), "impulse")
     assert found.outcome.ok
     assert found.q[-1, 0] == pytest.approx(0.09)
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_what_rows_accelerate_by_themselves_is_how_their_rates_change(seed: int) -> None:
+    """H' v of loops, welds, couplings, bounds and distances, off their surfaces, against differences of H v."""
+    scene = random_scene(seed).replace(pairs=())
+    q, v, _ = random_state(scene, np.random.default_rng(seed))
+    prepared = engines.load("pinocchio").prepare(cases.from_scene(scene, q0=q, v0=v, t_end=0.1)).scene
+    rows, (place, speed), h = prepared.rows, prepared.start, 1e-4
+    if not rows.nc:
+        return
+    there, here = (rows.jacobian(pin.integrate(rows.model, place, t * speed)) @ speed for t in (h, -h))
+    far, near = (rows.jacobian(pin.integrate(rows.model, place, t * speed)) @ speed for t in (2.0 * h, -2.0 * h))
+    wanted = (8.0 * (there - here) - (far - near)) / (12.0 * h)
+    size = 1.0 + np.abs(wanted).max()
+    assert np.abs(rows.drift(place, speed) - wanted).max() < 1e-6 * size

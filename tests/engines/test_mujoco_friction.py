@@ -18,7 +18,7 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction.creep import Soft, creep
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.engines.equations import system_of
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 FILE = """<mujoco><option gravity="{gravity}" cone="{cone}" impratio="{impratio}" timestep="{dt}"/><worldbody>
   <geom name="floor" type="plane" size="5 5 1" friction="{mu} 0 0" {floor}/>
@@ -160,7 +160,7 @@ def test_coefficients_of_zero_have_no_friction(profile: str, tmp_path: Path) -> 
 def test_a_file_is_run_with_friction_where_its_motion_comes_to_some(tmp_path: Path) -> None:
     text = FILE.format(gravity=f"0 0 {-G}", cone="pyramidal", impratio=1, dt=0.002, mu=0.3, floor="", shape=BALL,
                        soft="", speed="1 0 0 0 0 0")  # fmt: skip
-    picks = jobs.picks(["reference:compiled", "mujoco:as_is", "mujoco:matched"])
+    picks = choice.picks(["reference:compiled", "mujoco:as_is", "mujoco:matched"])
     for height, rubs in ((".1", True), ("9", False)):
         path = tmp_path / "ball.xml"
         path.write_text(text.replace("0 0 .1", f"0 0 {height}"))

@@ -17,7 +17,7 @@ from crossbody.reports.judging.audit import audit
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.truth import law_of
 from crossbody.reports.judging.verdict import Word
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 PACKAGES = {"exudyn": "exudyn", "drake": "pydrake", "dart": "dartpy", "pymunk": "pymunk"}
 LAW = ("exudyn", "drake")
@@ -141,8 +141,8 @@ def test_forces_bear_the_weight_and_change_the_momentum(name: str, seed: int) ->
 def test_no_engine_is_outside_in_a_shipped_case(name: str, case: str, variant: str) -> None:
     """Its own contact is a known property: what follows from it is judged by its size, and not left out."""
     peer(name)
-    (loaded,) = jobs.load_cases([case], variant, {})
-    result = jobs.run_case(loaded, jobs.picks([name]), refine=False)
+    (loaded,) = choice.load_cases([case], variant, {})
+    result = jobs.run_case(loaded, choice.picks([name]), refine=False)
     rows = judged(loaded, result.entries, result.truth, "")
     assert [(row.profile, row.metric, row.why) for row in rows if row.verdict == Word.OUTSIDE] == []
     assert {entry.profile for entry in result.entries if not entry.skipped} == {

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, Outcome
 from crossbody.cases.files.contacts import _why
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 GATE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody>
   <geom name="wall" type="box" pos="{wall} 0 0" size="{half} 1 1"/>
@@ -48,7 +48,7 @@ def test_a_meeting_between_two_steps_is_found_where_it_is(profile: str, seed: in
 def test_nothing_is_judged_behind_it(tmp_path: Path) -> None:
     case = cases.load(gate(tmp_path, speed=5.0))
     with pytest.raises(CaseUnsupported, match=r"gate.xml:thrown: Shapes .* come within reach at t = 0\.1996 s"):
-        jobs.run_case(case, [jobs.Pick(engine="reference", profile="compiled")])
+        jobs.run_case(case, [choice.Pick(engine="reference", profile="compiled")])
 
 
 def test_a_motion_that_passes_beside_it_runs(tmp_path: Path) -> None:

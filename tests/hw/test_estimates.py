@@ -12,6 +12,7 @@ from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Layout, _lagged, scatter, whiteness
 from crossbody.hw.fitting.information import in_words, information, to_keep, unseen_by
 from crossbody.hw.replaying.inverse import noise_of
+from crossbody.hw.windows.rates import derivatives, felt
 
 PARAMETERS = 3
 SHAPES = ("polynomials", "waves", "growing waves")
@@ -179,3 +180,22 @@ def test_noise_about_polynomials_is_what_was_put_in(half: int, degree: int) -> N
     t = np.linspace(0.0, 2.0, 20_000)
     y = np.column_stack([np.sin(t) + 1e-2 * random.standard_normal(len(t)), 3.0 * random.standard_normal(len(t))])
     assert noise_of(t, y, half, degree) == pytest.approx([1e-2, 3.0], rel=0.02)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.4, 1.0, 2.3, -1.2])
+@pytest.mark.parametrize(("half", "degree"), [(4, 2), (6, 4)])
+def test_a_smoothed_acceleration_feels_an_input_as_its_samples_are_late(half: int, degree: int, late: float) -> None:
+    """That of y, which is x a delay ago with x'' = u: a mean of the same steps, to what windows are rounded to."""
+    random, n = np.random.default_rng(half), 60
+    t = np.cumsum(random.uniform(0.8, 1.2, n))
+    u, delay = random.standard_normal((n, 2)), late
+    steps = np.diff(t)[:, None]
+    v = np.vstack([np.zeros((1, 2)), np.cumsum(u[:-1] * steps, axis=0)])
+    x = np.vstack([np.zeros((1, 2)), np.cumsum((v[:-1] + 0.5 * u[:-1] * steps) * steps, axis=0)])
+    then = t - delay
+    k = np.clip(np.searchsorted(t, then, side="right") - 1, 0, n - 1)
+    s = (then - t[k])[:, None]
+    y = x[k] + (v[k] + 0.5 * u[k] * s) * s
+    rows = np.arange(half + 4, n - half - 4)
+    acceleration = derivatives(t, y, half, degree, rows)[2]
+    assert felt(t, u, delay, half, degree, rows) == pytest.approx(acceleration, abs=1e-6)

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mechanisms import ball
+from scipy.linalg import expm
 
 from crossbody import cases
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, UnknownName
 from crossbody.reference import System, delta, simulate
 from crossbody.reference.linear import Unknown, balanced, filtered, sensitivity
+from crossbody.reference.linear._derivatives import Point
+from crossbody.reference.linear._kalman import Filter
 from crossbody.reference.systems.ball import KERNELS
 from crossbody.reports.analysis import places as analyse
 
@@ -83,6 +89,23 @@ def test_every_kind_of_event(scene):
 
     fd = differences(end, x[moved], step)
     assert np.abs(found.by_start[:, moved] - fd).max() < 1e-6 * np.abs(fd).max()
+
+
+@pytest.mark.parametrize("scene", ["red body", "red body, frozen"])
+def test_every_kind_of_event_by_parameters(scene):
+    """Inertias are in every map by which velocities jump, and in no start; the wall is in a guard."""
+    name, changed, t_end, step = SCENES[scene]
+    case = cases.load(name, **changed)
+    system, rule = analyse.build(case), {"collisions": case.collisions}
+    which = ["mass", "inertia", "gravity", "wall"]
+    found = sensitivity(system, case.q0, case.v0, t_end, parameters=which, **rule)
+
+    def end(part):
+        given = {**system.parameters, **dict(zip(which, part.tolist(), strict=True))}
+        return ends(replace(system, parameters=given), case.q0, case.v0, t_end, **rule)
+
+    fd = differences(end, np.array([system.parameters[one] for one in which]), step)
+    assert np.abs(found.by_parameters - fd).max() < 1e-5 * np.abs(fd).max()
 
 
 def test_monodromy_of_a_bounce_without_loss():
@@ -242,3 +265,19 @@ def test_wrong_records_are_told():
         filtered(system, [0.0, 1.0], [[0.0]], **good)
     with pytest.raises(InvalidValue, match="deviation"):
         balanced(system, [0.0], [[0.0]], [[0.0]], [[0.0]], unknown=Unknown(rows=(0,)))
+
+
+@pytest.mark.parametrize("dt", [0.05, 0.2, 0.5])
+def test_noise_that_a_filter_adds_is_that_of_the_whole_interval(dt):
+    """Of linear rates it is known in closed form (Van Loan 1978), and Simpson's rule has it to the fourth order."""
+    system = ball(a0=1e4, a1=40.0, a2=0.0)
+    record = SimpleNamespace(system=system, unknown=(0,), t=np.array([0.0, dt]))
+    start = Point(system=system, t=0.0, q=np.zeros(1), v=np.zeros(1), u=np.zeros(0), active=np.zeros(0, dtype=np.int64))
+    one = Filter(record, start, np.zeros(1, dtype=np.int64), np.ones(1), np.ones(1), 0.7, (0.0, 0.0))
+    A = np.array([[0.0, 1.0, 0.0], [-3.0, -0.4, 1.0], [0.0, 0.0, -1.0 / 0.7]])
+    one._flow = lambda k: (A @ one.z, A)
+    one.P[:] = 0.0
+    one._predict(0)
+    both = expm(dt * np.block([[-A, one.Q], [np.zeros((3, 3)), A.T]]))
+    expected = both[3:, 3:].T @ both[:3, 3:]
+    assert np.abs(one.P - expected).max() < 0.05 * dt**4 * np.abs(expected).max()

@@ -48,3 +48,13 @@ def test_a_kink_of_a_force_is_passed_within_the_tolerance(name: str, profile: st
     found = run.run()
     assert found.outcome is Outcome.FINISHED
     assert abs(found.q[-1, 0] - wanted) <= 20.0 * rtol
+
+
+@pytest.mark.parametrize("who", ["mujoco:matched", "pinocchio:law"])
+@pytest.mark.parametrize("name", list(SCENES))
+def test_engines_bound_forces_where_the_scene_does(name: str, who: str) -> None:
+    t_end, wanted = end_of(name)
+    case, (engine, profile) = cases.from_scene(SCENES[name], q0=[START], t_end=t_end), who.split(":")
+    found = engines.load(engine).prepare(case, profile).run()
+    assert found.outcome is Outcome.FINISHED
+    assert abs(found.q[-1, 0] - wanted) <= 1e-6

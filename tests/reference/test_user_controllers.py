@@ -38,7 +38,7 @@ from crossbody.reports.cli import cli
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.truth import from_run
 from crossbody.reports.metrics import load as metric
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 
 RUNS = (("reference", "compiled"), ("reference", "cvode"), ("reference", "ida"), ("mujoco", "matched"),
         ("pinocchio", "law"))  # fmt: skip

@@ -25,7 +25,7 @@ from crossbody.reports.bench.scenes import DROP, QUICK
 from crossbody.reports.bench.throughput import best_pair
 from crossbody.reports.cli import main
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 
 ORDERS = {"second": 2.0, "liar": 4.0, "fails": 1.0, "throws": 1.0}
 

@@ -24,7 +24,7 @@ from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, from_run
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 BIPED = ROBOTS / "agility_cassie" / "cassie.xml"
 
@@ -266,7 +266,7 @@ SOFT = """
 
 def rows_of(path: str, **settings: Any) -> dict[str, Verdict]:
     case = cases.load(path, t_end=0.5)
-    result = jobs.run_case(case, jobs.picks(["mujoco:as_is"]), settings=settings)
+    result = jobs.run_case(case, choice.picks(["mujoco:as_is"]), settings=settings)
     return {row.metric: row for row in judged(case, result.entries, result.truth, "crossbody run")}
 
 
@@ -302,7 +302,7 @@ def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: p
     path = tmp_path / "soft.xml"
     path.write_text(SOFT.format(solref="-1e4 -200"), encoding="utf-8")
     case = cases.load(str(path), t_end=0.5)
-    right = jobs.run_case(case, jobs.picks(["mujoco:as_is"]))
+    right = jobs.run_case(case, choice.picks(["mujoco:as_is"]))
     monkeypatch.setattr(scene, "_from_file", wrong)
     run = engines.load("mujoco").prepare(case, "as_is").run()
     assert right.entries[0].study is not None
@@ -383,7 +383,7 @@ def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: p
         bodies=(Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0)),),
         joints=(Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0)),),
     )
-    pick, swing = jobs.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
+    pick, swing = choice.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
     told = [jobs.run_case(swing, [pick], truth=None).entries[0].study]
     monkeypatch.setattr(jobs, "STUDIES_S", 0.0)
     told.append(jobs.run_case(swing, [pick], truth=None).entries[0].study)
@@ -398,7 +398,7 @@ def test_a_study_has_as_many_steps_as_there_is_time_for(monkeypatch: pytest.Monk
         bodies=(Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0)),),
         joints=(Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0)),),
     )
-    pick, swing = jobs.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
+    pick, swing = choice.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
     for seconds, count in ((10.0, 6), (4.5, 4), (3.0, 3), (2.9, 0)):
         monkeypatch.setattr(jobs, "STUDIES_S", seconds)
         told = jobs.run_case(swing, [pick], truth=None).entries[0].study

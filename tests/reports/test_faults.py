@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from crossbody import cases, engines
 from crossbody.cases import Case, Claim, InvalidValue, Limit, Mode, Outcome, Tier, Trajectory, UnknownName, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports import metrics
+from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.parts import PARTS
 from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.measuring.truth import Truth
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 Fault = Callable[[Trajectory], Trajectory]
 Recorded = dict[tuple[str, str], tuple[Case, Truth, dict[str, Entry]]]
@@ -93,7 +97,7 @@ def recorded() -> Recorded:
     found = {}
     for name, variant in SCENES:
         case = load(name, variant)
-        result = jobs.run_case(case, jobs.picks(ENGINES))
+        result = jobs.run_case(case, choice.picks(ENGINES))
         found[name, variant] = (case, result.truth, {f"{e.engine}:{e.profile}": e for e in result.entries})
     return found
 
@@ -111,7 +115,7 @@ def test_what_was_recorded_is_not_outside(recorded: Recorded, scene: tuple[str, 
 
 def test_collisions_that_take_energy_in_no_time_are_not_outside() -> None:
     case = load("newtons_cradle", "sliders", zeta=0.2)
-    found = jobs.run_case(case, jobs.picks(("reference:compiled", "reference:cvode")), refine=False)
+    found = jobs.run_case(case, choice.picks(("reference:compiled", "reference:cvode")), refine=False)
     assert [_outside(case, entry, found.truth) for entry in found.entries] == [[], []]
 
 
@@ -192,7 +196,7 @@ def test_what_was_compared_over_a_small_part_is_not_judged(recorded: Recorded) -
 def deviating() -> tuple[Case, Truth, Entry]:
     """A ball by a contact of MuJoCo's own."""
     case = load("bouncing_ball", "listing")
-    result = jobs.run_case(case, jobs.picks(["mujoco:default"]))
+    result = jobs.run_case(case, choice.picks(["mujoco:default"]))
     return case, result.truth, result.entries[0]
 
 
@@ -259,7 +263,7 @@ def test_an_engine_that_throws_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None
         return real(reference, case, profile, **settings)  # type: ignore[arg-type]
 
     monkeypatch.setattr(type(reference), "prepare", prepare)
-    result = jobs.run_case(case, jobs.picks(["reference:cvode", "reference:compiled"]))
+    result = jobs.run_case(case, choice.picks(["reference:cvode", "reference:compiled"]))
     rows = judged(case, result.entries, result.truth, "")
     crashed = [row for row in rows if row.verdict == Word.CRASHED]
     assert [(row.profile, row.metric) for row in crashed] == [("cvode", "run")]
@@ -292,6 +296,27 @@ def test_a_shipped_run_stays_in_its_regression_bands(recorded: Recorded, scene: 
     assert [row.metric for row in rows if row.regression == Regression.LOST] == []
 
 
+def test_every_number_of_a_run_has_a_band(recorded: Recorded) -> None:
+    """Also what nobody judges: it is seen to move."""
+    rows = [row for case, truth, entries in recorded.values() for row in judged(case, [*entries.values()], truth, "")]
+    parts = tuple(f"({part})" for part in PARTS)
+    told = [row for row in rows if not math.isnan(row.value) and not row.metric.endswith(parts)]
+    bare = {row.metric for row in told if math.isnan(row.band)}
+    assert bare == {"truth", "finished", "audit"}
+
+
+@pytest.mark.parametrize("label", [f"{name}:{variant}" for name in cases.names() for variant in cases.variants(name)])
+def test_every_run_of_a_shipped_case_is_stored(label: str) -> None:
+    case = load(*label.split(":"))
+    bare = [
+        f"{pick.engine}:{pick.profile}"
+        for pick in choice.picks(["reference", "mujoco", "pinocchio", "exudyn", "dart", "pymunk"])
+        if engines.load(pick.engine).why_not(case, pick.profile) is None
+        and not stored.differing(case, Entry(engine=pick.engine, profile=pick.profile))
+    ]
+    assert bare == []
+
+
 def test_a_number_that_left_its_band_is_wrong_if_that_is_asked_for(recorded: Recorded) -> None:
     case, truth, entries = recorded["newtons_cradle", "sliders"]
     entry = entries["reference:compiled"]
@@ -307,4 +332,4 @@ def test_a_number_that_left_its_band_is_wrong_if_that_is_asked_for(recorded: Rec
 def test_samples_of_a_judged_run_are_not_the_callers_to_choose() -> None:
     """Too few would show neither its events nor its forces, and a right run would be outside."""
     with pytest.raises(InvalidValue, match="leave samples out"):
-        jobs.run_case(load("bouncing_ball", "resting"), jobs.picks(["reference:compiled"]), settings={"samples": 201})
+        jobs.run_case(load("bouncing_ball", "resting"), choice.picks(["reference:compiled"]), settings={"samples": 201})

@@ -15,7 +15,7 @@ from crossbody.cases import EngineUnavailable, Mode, Trajectory
 from crossbody.reports.cli import main
 from crossbody.reports.maps import gapmap
 from crossbody.reports.maps.figure import gap_map as figure
-from crossbody.reports.runs.jobs import Pick, picks
+from crossbody.reports.runs.choice import Pick, picks
 
 REFERENCE = Pick(engine="reference", profile="compiled")
 

@@ -17,7 +17,7 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import limit_for
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.impulse import with_collisions
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice, jobs
 
 MAZES = cases.variants("ball_maze")
 FACTORS = (0.1, 0.5, 2.0)
@@ -33,7 +33,7 @@ QUICK = (
 
 def outside(name: str, variant: str, factor: float, engine: str) -> list[tuple[str, str, float, str]]:
     case = cases.load(name, variant, t_end=factor * cases.load(name, variant).t_end)
-    found = jobs.run_case(case, jobs.picks((engine,)), refine=False)
+    found = jobs.run_case(case, choice.picks((engine,)), refine=False)
     rows = judged(case, found.entries, found.truth, "")
     return [(row.profile, row.metric, row.value, row.why) for row in rows if row.verdict in ("outside", "crashed")]
 

@@ -14,7 +14,7 @@ from crossbody.reports import metrics
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.runs import jobs, study
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 
 FORCES = ("lam_error", "lam_impulse", "lam_impulse_path", "law_residual")
 

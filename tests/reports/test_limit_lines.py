@@ -13,7 +13,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.pages import figures
 from crossbody.reports.runs import study
-from crossbody.reports.runs.jobs import CaseResult, Pick, run_case
+from crossbody.reports.runs.choice import Pick
+from crossbody.reports.runs.jobs import CaseResult, run_case
 
 DRAWN = {"position": ("motion", 2), "lam_impulse_path": ("force", 3), "energy_integrator": ("energy", 3)}
 """Metric -> figure and which plot of it shows the error."""

@@ -10,15 +10,15 @@ import pytest
 from crossbody import cases
 from crossbody.reports.judging.told import WRONG
 from crossbody.reports.pages import site
-from crossbody.reports.runs import jobs, study
+from crossbody.reports.runs import choice, jobs, study
 from crossbody.reports.runs.output import folder
 
-CASE = jobs.DEFAULT_CASES[0]
+CASE = choice.DEFAULT_CASES[0]
 
 
 @cache
 def result(variant: str) -> jobs.CaseResult:
-    return jobs.run_case(cases.load(CASE, variant), jobs.picks(()))
+    return jobs.run_case(cases.load(CASE, variant), choice.picks(()))
 
 
 @pytest.mark.parametrize("variant", cases.variants(CASE))

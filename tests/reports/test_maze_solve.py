@@ -17,7 +17,7 @@ from crossbody.reference.systems import maze
 from crossbody.reports import metrics
 from crossbody.reports.commands import maps
 from crossbody.reports.maps import stability
-from crossbody.reports.runs import jobs
+from crossbody.reports.runs import choice
 
 CHANNEL, LOWER, UPPER, MODE = range(4)
 BALANCE, SNATCH, CENTRE = 1, 2, 3
@@ -207,7 +207,7 @@ def test_map_is_a_command_with_a_section_of_the_page(tmp_path, monkeypatch, caps
 
 
 def test_an_engine_that_cannot_run_the_maze_says_so():
-    pick = jobs.Pick(engine="absent", profile="any", skipped="absent is not installed.")
+    pick = choice.Pick(engine="absent", profile="any", skipped="absent is not installed.")
     rows = stability.stability_map([pick], [stability.Point(change="default")])
     assert rows["outcome"].tolist() == ["skipped"]
     assert rows["why"].tolist() == ["absent is not installed."]

@@ -16,9 +16,11 @@ from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
 from crossbody.reports.judging.reach import LEAST, MANY, SHORTEST, cut_short, followed
+from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.truth import Truth, from_run, shortened
-from crossbody.reports.runs.jobs import picks, run_case
+from crossbody.reports.runs.choice import picks
+from crossbody.reports.runs.jobs import run_case
 
 INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
 
@@ -168,6 +170,7 @@ def test_a_motion_that_takes_too_long_is_compared_as_far_as_it_is_followed() -> 
     (row,) = truth_row(found.case, found.truth, "")
     assert row.compared == found.truth.part
     assert f"Followed to {reached:.4g} s of 2000 s" in row.why
+    assert "of the horizon (more takes longer than --budget allows)" in sentence(runs_of([row.row()]))
     assert found.entries[0].run is not None
     assert found.entries[0].run.t[-1] <= reached
     own = followed(replace(case, t_end=reached)).motion

@@ -24,7 +24,7 @@ from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome, SceneError, Trajectory, UnknownName
 from crossbody.reports import suites
 from crossbody.reports.judging.verdict import Word
-from crossbody.reports.runs.jobs import Pick
+from crossbody.reports.runs.choice import Pick
 from crossbody.reports.suites.axis import Levels, Linear, Log, Whole, decades
 from crossbody.reports.suites.contract import Family, Ladder, Suite
 from crossbody.reports.sweep import draw

@@ -174,7 +174,7 @@ def balls(runs: int, **changed: Any) -> list[Spec]:
 
 
 def plan_picks() -> Any:
-    from crossbody.reports.runs.jobs import picks
+    from crossbody.reports.runs.choice import picks
 
     return picks(["reference:compiled"])
 

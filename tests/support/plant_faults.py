@@ -83,6 +83,7 @@ class Tree:
         for name in FOLDERS:
             shutil.copytree(ROOT / name, package / name, ignore=shutil.ignore_patterns("__pycache__"))
             (folder / name).symlink_to(package / name)
+        (package / "__init__.py").touch()  # regular: it comes before what is installed, without a warning
         # By their content: a fault comes and goes within the second by which times would tell it.
         compileall.compile_dir(package, quiet=2, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
         shutil.copytree(ROOT / "tests", folder / "tests", ignore=shutil.ignore_patterns("__pycache__"))

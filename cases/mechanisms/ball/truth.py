@@ -72,10 +72,12 @@ def release_time(ball: Ball, h: float, v: float) -> float:
     low = _next_turn(turned, at_top=start > 0.0)
     if math.isinf(low) or float(acceleration(start + low)) + ball.gravity >= 0.0:
         return math.inf
-    from scipy.optimize import brentq  # a quarter of a second, which most variants do not need
-
-    root: float = brentq(lambda t: float(acceleration(t)) + ball.gravity, start, start + low, xtol=1e-300, rtol=1e-15)
-    return root
+    early, late = start, start + low
+    while (
+        early < (middle := 0.5 * (early + late)) < late
+    ):  # to the last bit, at a thousandth of what SciPy takes to import
+        early, late = (middle, late) if float(acceleration(middle)) + ball.gravity > 0.0 else (early, middle)
+    return late
 
 
 def _next_turn(x: LinearArc, *, at_top: bool) -> float:
