@@ -23,11 +23,12 @@ from crossbody.reference.core import (
     settle,
     stepping,
 )
-from crossbody.reference.core.acceleration import GENERAL, accelerate, scatter
+from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
-from crossbody.reference.core.friction import BEGIN_SLIP, NOTHING, RENEW, ask
+from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, NOTHING, RENEW, ask, has_friction, is_dry
 from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
+    BALLISTIC,
     DONE,
     EVENTS_FULL,
     EXACT,
@@ -38,11 +39,15 @@ from crossbody.reference.core.layout import (
     LOST,
     MODE_CYCLE,
     MORE,
+    NO_CONSISTENT_MODES,
     NODES,
     NOT_FINITE,
     PAINLEVE,
     ROWS_FULL,
     SHORT,
+    SLIP,
+    STEP_TOO_SMALL,
+    STICK,
     TOO_LONG,
     Buffers,
     Model,
@@ -55,6 +60,8 @@ from crossbody.reference.core.machine import active_mode
 from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
+
+JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
 
 
 class Kernels(NamedTuple):
@@ -168,18 +175,26 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             return ILL_POSED
         scatter(s, w, w.lam0)
     K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
-    record.here(K, s, m, w, b.mode, b.out, b.modes, False)
+    if not (s.frictional and events.pulls_in_a_jam(s, m, w, b.mode)):
+        record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
-    moved, touched = False, False
-    if s.frictional and _slip_or_jam(K, s, m, w, b):
-        return PAINLEVE
+    moved, touched, stopped, drifts = False, False, False, False
+    s.jam = s.frictional and _slip_or_jam(K, s, m, w)
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
+            stopped = stopped or w.kind[i] == guards.STOP
+            drifts = drifts or w.kind[i] == guards.DRIFT
             if after != b.mode[i]:
                 touched = touched or b.mode[i] == FREE
                 journal.move(s, b, i, after)
                 moved = True
+    for i in range(s.nc if stopped else 0):
+        if events.stops_too(s, m, w, b.mode, i):
+            journal.move(s, b, i, STICK)
+    for i in range(s.nc if drifts else 0):
+        if events.drifts_too(s, m, w, b.mode, i):
+            journal.move(s, b, i, SLIP)
     for i in range(s.nc if touched else 0):
         if events.touches_too(s, m, w, b.mode, i):
             journal.move(s, b, i, active_mode(s, m, w, i))
@@ -193,6 +208,11 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             if settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
                 return LOST
     code = _restart(K, s, m, w, b)
+    jam, s.jam = s.jam, 0
+    if (jam and code == NO_CONSISTENT_MODES) or (s.frictional and code == MODE_CYCLE and _all_jam(K, s, m, w, b)):
+        return PAINLEVE
+    if jam and code == 0 and not s.indeterminate:  # other modes go on from there, and no law says which
+        s.indeterminate, s.determined_until = 1, s.t
     if code == 0 and s.audited:
         code = audit.account(K, s, m, w)
     if code == 0:
@@ -201,24 +221,49 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @compiled
-def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Let contacts that begin to slide do so against what held them; whether one has jammed, which is marked.
+def _slip_or_jam(K: Any, s: Any, m: Model, w: Work) -> bool:
+    """Let contacts that begin to slide do so against what held them; whether some have jammed.
 
     Leaves in s.jumps whether loads do: not where a force reaches its bound or vanishes.
     """
-    slips, s.jumps = False, 0
+    slips, jam, s.jumps = False, False, 0
     for i in range(s.nc):
-        s.jumps |= w.hit[i] <= s.theta and w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
-        if w.hit[i] <= s.theta and w.kind[i] == guards.JAM:
-            marks = b.history[len(b.history) - 1]
-            marks[:] = 0
-            marks[i] = 1
-            return True
-        slips = slips or (w.hit[i] <= s.theta and w.kind[i] == guards.CONE)
+        if w.hit[i] <= s.theta:
+            s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
+            jam = jam or w.kind[i] == guards.JAM
+            slips = slips or w.kind[i] == guards.CONE
     nq = s.nq
     if slips and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
         ask(BEGIN_SLIP, s, m, w, NOTHING)
-    return False
+    return jam
+
+
+@compiled
+def _all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Whether contacts that let go in turn would jam if all pressed that close; it marks these."""
+    for i in range(s.nc):
+        closes = has_friction(m, i) and b.mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
+        if closes and not is_dry(m, i):
+            b.mode[i] = active_mode(s, m, w, i)
+    activate(s, m, w, b.mode)
+    return bool(_jams(K, s, m, w, b, 0.0))
+
+
+@compiled
+def _jams(K: Any, s: Any, m: Model, w: Work, b: Buffers, near: float) -> bool:
+    """Whether contacts that slide jam, or come as `near` to it; it marks these.
+
+    Before they jam their forces grow without bound, so that no step is short enough, unless what drives them vanishes
+    as well.
+    """
+    nq, found, marks = s.nq, False, b.history[len(b.history) - 1]
+    marks[:] = 0
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
+        for i in range(s.nc):
+            slides = has_friction(m, i) and b.mode[i] == SLIP and not is_dry(m, i)
+            if slides and ask(DETERMINANT, s, m, w, i) < near:
+                marks[i], found = 1, True
+    return found
 
 
 @compiled
@@ -233,6 +278,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.method = EXPLICIT
         before = s.method
         code = stepping.attempt(K, s, m, w, b)
+    if code == STEP_TOO_SMALL and s.frictional and _jams(K, s, m, w, b, JAMMING):
+        return PAINLEVE
     if code != 0:
         return code
     code = events.scan(K, s, m, w, b.mode)
@@ -260,8 +307,9 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)
-    if s.frictional:
-        ask(RENEW, s, m, w, NOTHING)
+    if s.frictional and ask(RENEW, s, m, w, NOTHING) > 0.0 and not at_stop:
+        s.theta = 1.0
+        return _switch(K, s, m, w, b)
     if s.audited:
         code = audit.account(K, s, m, w)
         if code != 0:

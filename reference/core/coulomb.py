@@ -36,13 +36,16 @@ from crossbody.reference.core.friction import (
 )
 from crossbody.reference.core.guards import STOP
 from crossbody.reference.core.layout import NODES, Model, Work
-from crossbody.reference.kinds import Array, Floats, Index
+from crossbody.reference.kinds import Array, Bytes, Floats, Index
 
 CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip counts from none
 RANK = 1e-10  # part of a contact's own size below which a pivot is that of a row which depends on others
 LIGHT = 1e-12  # part of the largest load at a contact, below which it counts as that
 OPEN = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
 SHARINGS = 3  # times that loads are shared anew: the normal ones follow from the tangential ones
+MOST_SPREADS = 200  # times more where a contact would bear more than it can: others may for it
+JAMMED = 1e-9  # determinant, of rows of size 1, that counts as none
+LINGERS = 10.0  # times as long as friction takes to stop what has no direction: what slides so slowly is held
 
 
 @compiled
@@ -50,7 +53,7 @@ def begin(w: Work) -> None:
     """Forget what another run of the same workspace has left."""
     for left in (w.way, w.rest, w.tolerated):
         left[:] = 0.0
-    w.off[:], w.begins[:], w.since[:] = 0, 0, -np.inf
+    w.off[:], w.begins[:], w.since[:], w.within[:] = 0, 0, -np.inf, np.inf
 
 
 @compiled
@@ -98,9 +101,28 @@ def _rest(m: Model, w: Work, i: int) -> float:
 
 
 @compiled
-def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
-    """Take the directions of the present slip velocities for those of reference, where they are clear of zero."""
+def _lingers(s: Any, m: Model, w: Work, i: int, rate: Array) -> bool:
+    """Whether contact i has been sliding without a direction for far longer than its friction takes to stop it.
+
+    Others hold the body, and what they leave it dies out without ever passing zero. Such a contact is at rest.
+    """
+    if has_begun(w, i) or slip(m, w, i, rate) > small_slip(s):
+        w.within[i] = np.inf
+        return False
+    w.within[i] = min(w.within[i], s.t)
+    c = w.listed[m.tangent[i]]
+    brake = bound(m, i, w.lam0[i]) * w.gram[c, c]
+    return bool((s.t - w.within[i]) * brake > LINGERS * small_slip(s))
+
+
+@compiled
+def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
+    """Take the directions of the present slip velocities for those of reference, where they are clear of zero.
+
+    Whether contacts have stopped without passing zero: they are marked as if they had passed it.
+    """
     note_speed(s, m, w, rate)
+    linger = False
     for i in range(s.nc):
         if has_friction(m, i) and w.slides[i]:
             if has_begun(w, i) and slip(m, w, i, rate) > CLEAR * max(small_slip(s), _rest(m, w, i)):
@@ -110,10 +132,13 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> None:
                 _face(m, w, i, rate)
             if m.tangents[i] > 1:
                 s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
+            if _lingers(s, m, w, i, rate):
+                w.hit[i], w.kind[i], linger = 0.0, STOP, True
     if s.na > 0 and s.dependent_rows > 0:
         s.redundant = max(s.redundant, s.dependent_rows)
         if not s.indeterminate and undetermined(s, m, w):
             s.indeterminate, s.determined_until = 1, s.t
+    return linger
 
 
 @compiled
@@ -403,9 +428,6 @@ def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
 
     Those that slide with a bound of their own get it, and their forces count on the right-hand side.
     """
-    if s.dry == 0:
-        respond(s, m, w, r, la)
-        return
     for j in range(s.na):
         w.pushed[j] = r[j]
     for c in range(s.na):
@@ -413,7 +435,10 @@ def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
             force = -m.friction[w.idx[c]] * w.along[c]
             for j in range(s.na):
                 w.pushed[j] -= w.gram[j, c] * force
-    respond(s, m, w, w.pushed, la)
+    _solve_unknowns(s, m, w, w.pushed)
+    if s.dependent_rows > 0 and s.rank_second < s.unknowns - s.normals:
+        _spread(s, m, w)
+    _give(s, m, w, la)
     for c in range(s.na):
         if is_dry(m, w.idx[c]) and w.slides[w.idx[c]]:
             la[c] = -m.friction[w.idx[c]] * w.along[c]
@@ -422,16 +447,27 @@ def solve(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
 @compiled
 def respond(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
     """Fill la of all rows in contact by how it changes with r: constant forces of rows that slide have no part."""
-    total = s.unknowns
-    for a in range(total):
+    _solve_unknowns(s, m, w, r)
+    _give(s, m, w, la)
+
+
+@compiled
+def _solve_unknowns(s: Any, m: Model, w: Work, r: Array) -> None:
+    """Leave in w.found the unknowns, scaled by their sizes."""
+    for a in range(s.unknowns):
         w.found[a] = r[w.unknown[a]] / w.size[a]
     if s.dependent_rows > 0:
         _solve_in_turn(s, m, w)
     else:
-        solve_complete(w.matrix, total, s.rank, w.down, w.across, w.weight, w.square, w.beside, w.found)
+        solve_complete(w.matrix, s.unknowns, s.rank, w.down, w.across, w.weight, w.square, w.beside, w.found)
+
+
+@compiled
+def _give(s: Any, m: Model, w: Work, la: Array) -> None:
+    """Multipliers of all rows in contact from the unknowns."""
     for j in range(s.na):
         la[j] = 0.0
-    for a in range(total):
+    for a in range(s.unknowns):
         la[w.unknown[a]] = w.found[a] / w.size[a]
     for j in range(s.na):
         i = w.idx[j]
@@ -457,16 +493,61 @@ def _solve_in_turn(s: Any, m: Model, w: Work) -> None:
         w.press[a] = w.found[a]
     for _ in range(SHARINGS if s.rank_second < sticking else 1):
         _weigh(s, m, w)
-        for a in range(sticking):
-            w.found[count + a] = w.left[a]
-        solve_complete(
-            w.second, sticking, s.rank_second, w.down2, w.across2, w.weight, w.square, w.beside, w.found[count:]
-        )  # fmt: skip
-        for a in range(count):
-            value = w.press[a]
+        _share(s, w)
+
+
+@compiled
+def _share(s: Any, w: Work) -> None:
+    """Solve for the sticking rows by w.weight, and for the normal ones beside them."""
+    count, sticking = s.normals, s.unknowns - s.normals
+    for a in range(sticking):
+        w.found[count + a] = w.left[a]
+    solve_complete(
+        w.second, sticking, s.rank_second, w.down2, w.across2, w.weight, w.square, w.beside, w.found[count:]
+    )  # fmt: skip
+    for a in range(count):
+        value = w.press[a]
+        for c in range(sticking):
+            value -= w.held[a, c] * w.found[count + c]
+        w.found[a] = value
+
+
+@compiled
+def _spread(s: Any, m: Model, w: Work) -> None:
+    """Share the loads of sticking contacts anew until none bears more than it can, or it is known that some must.
+
+    Lawson's weights, which grow with what a contact bears of its bound, lead to the sharing whose largest part is the
+    least. Squares of the parts, weighted, sum up to no more than the square of that: where they do to 1 none suffices.
+    """
+    count, sticking = s.normals, s.unknowns - s.normals
+    for spread in range(MOST_SPREADS):
+        _weigh(s, m, w)
+        total, most = 0.0, 0.0
+        for a in range(sticking):  # bounds, and parts of them
+            w.left2[a] = w.weight[a] / w.size[count + a] ** 2
+            square = 0.0
             for c in range(sticking):
-                value -= w.held[a, c] * w.found[count + c]
-            w.found[a] = value
+                if m.follows[w.idx[w.unknown[count + c]]] == m.follows[w.idx[w.unknown[count + a]]]:
+                    square += (w.found[count + c] / w.size[count + c]) ** 2
+            unbounded = m.friction[m.follows[w.idx[w.unknown[count + a]]]] == np.inf
+            w.part2[a] = 0.0 if unbounded else np.sqrt(square) / w.left2[a]
+            most = max(most, w.part2[a])
+            if spread == 0:
+                w.share2[a] = w.left2[a]
+            total += w.share2[a]
+        if not most > 1.0:
+            return
+        sum1, sum2 = 0.0, 0.0
+        for a in range(sticking):
+            w.share2[a] /= total
+            sum1 += w.share2[a] * w.part2[a]
+            sum2 += w.share2[a] * w.part2[a] ** 2
+        if not sum2 <= 1.0:
+            return
+        for a in range(sticking):
+            w.share2[a] = max(w.share2[a] * w.part2[a] / sum1, LIGHT)
+            w.weight[a] = (w.left2[a] * w.size[count + a]) ** 2 / w.share2[a]
+        _share(s, w)
 
 
 @compiled
@@ -488,16 +569,104 @@ def _weigh(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def stiffness(s: Any, m: Model, w: Work, j: int) -> float:
-    """P = 1/(A^-1)_jj of the row in place j: what its multiplier does to its own gap, all others following their laws.
-
-    Scratch: w.r, w.trial.
-    """
+def _reach(s: Any, m: Model, w: Work, j: int) -> None:
+    """Mark in w.reached the places of rows in contact that forces of the row in place j move, or that move with it."""
     for a in range(s.na):
-        w.r[a] = 0.0
-    w.r[j] = 1.0
-    respond(s, m, w, w.r, w.trial)
-    return float(1.0 / w.trial[j]) if w.trial[j] != 0.0 else np.inf
+        w.reached[a] = a == j
+    grows = True
+    while grows:
+        grows = False
+        for a in range(s.na):
+            own = m.follows[w.idx[a]] if is_tangent(m, w.idx[a]) else w.idx[a]
+            for c in range(s.na if w.reached[a] else 0):
+                i = w.idx[c]
+                beside = i == own or (is_tangent(m, i) and m.follows[i] == own)
+                if not (w.reached[c] or w.off[i]) and (beside or w.gram[a, c] != 0.0):
+                    w.reached[c] = 1
+                    grows = True
+
+
+@compiled
+def _signed_product(A: Floats, n: int, down: Index, across: Index, seen: Bytes) -> float:
+    """Determinant from the factors of `factor_complete`, of the rows whose places `seen` does not mark; it fills it."""
+    product = 1.0
+    for a in range(n):
+        b, length = a, 0
+        while not seen[b]:
+            seen[b] = 1
+            product *= A[b, b]
+            length += 1
+            for c in range(n):
+                if down[c] == across[b]:
+                    b = c
+                    break
+        if length > 0 and length % 2 == 0:
+            product = -product
+    return float(product)
+
+
+@compiled
+def _independent(s: Any, w: Work, count: int) -> int:
+    """Factor G = L L^T of the unknowns that w.among lists into w.second, their places in w.down2; how many rows."""
+    for a in range(count):
+        for b in range(count):
+            j, k = w.among[a], w.among[b]
+            w.square[a, b] = w.gram[w.unknown[j], w.unknown[k]] / (w.size[j] * w.size[k])
+    rank = 0
+    while rank < count:
+        most, best = RANK, -1
+        for a in range(count):
+            if w.square[a, a] > most:
+                most, best = w.square[a, a], a
+        if best < 0:
+            break
+        for a in range(count):
+            w.second[a, rank] = w.square[a, best] / np.sqrt(most)
+        for a in range(count):
+            for b in range(count):
+                w.square[a, b] -= w.second[a, rank] * w.second[b, rank]
+        w.square[best, best] = 0.0
+        w.down2[rank] = best
+        rank += 1
+    return rank
+
+
+@compiled
+def determinant(s: Any, m: Model, w: Work, j: int) -> float:
+    """Determinant of A of the rows that the sliding contact in place j bears on: positive until they jam together.
+
+    Where it vanishes some forces of theirs press none of them, and behind that their forces drive them into each other:
+    of one contact alone it is Painleve's p. Of rows that depend on each other only what forces do to independent ones
+    counts, as by springs that are all alike: with G = L L^T it is that of L^+ A L. Less JAMMED: two that come near that
+    place together press in turn, ever faster.
+    """
+    _reach(s, m, w, j)
+    if s.dependent_rows == 0:
+        for a in range(s.unknowns):
+            w.seen[a] = not w.reached[w.unknown[w.down[a]]]
+        return _signed_product(w.matrix, s.unknowns, w.down, w.across, w.seen) - JAMMED
+    _fill(s, m, w)
+    count = 0
+    for a in range(s.unknowns):
+        if w.reached[w.unknown[a]]:
+            w.among[count] = a
+            count += 1
+    rank = _independent(s, w, count)
+    for b in range(count):
+        for a in range(rank):
+            value = w.matrix[w.among[w.down2[a]], w.among[b]]
+            for c in range(a):
+                value -= w.second[w.down2[a], c] * w.held[c, b]
+            w.held[a, b] = value / w.second[w.down2[a], a]
+    for a in range(rank):
+        for b in range(rank):
+            w.first[a, b] = 0.0
+            for c in range(count):
+                w.first[a, b] += w.held[a, c] * w.second[c, b]
+    if factor_complete(w.first, rank, rank, w.down, w.across) < rank:
+        return -JAMMED
+    w.seen[:] = 0
+    return _signed_product(w.first, rank, w.down, w.across, w.seen) - JAMMED
 
 
 @compiled
@@ -518,10 +687,13 @@ def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
         i = w.idx[j]
         if has_friction(m, i) and not w.slides[i]:
             out[i] = margin(m, w, i, w.la)
+    value, known = 0.0, False
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i) and w.slides[i] and not is_dry(m, i):
-            out[i] = stiffness(s, m, w, j)
+            if not (known and w.reached[j]):
+                value, known = determinant(s, m, w, j), True
+            out[i] = value
 
 
 @compiled

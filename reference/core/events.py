@@ -15,7 +15,18 @@ from crossbody.reference.core import dense, filters
 from crossbody.reference.core.acceleration import OWN, accelerate, is_active, scatter
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
-from crossbody.reference.core.friction import NOTHING, TURNS_ASIDE, WATCH, ask, is_dry
+from crossbody.reference.core.friction import (
+    NOTHING,
+    TURNS_ASIDE,
+    WATCH,
+    ask,
+    has_begun,
+    has_friction,
+    is_dry,
+    most_drift,
+    slip,
+    small_slip,
+)
 from crossbody.reference.core.guards import (
     CATCH,
     CONE,
@@ -269,6 +280,33 @@ def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
 
 @compiled
+def stops_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether contact i slides no faster than what has no direction, where another one stops: they stop together.
+
+    Rounding has one of them stop first. One that has just begun to slide goes on.
+    """
+    slides = has_friction(m, i) and mode[i] == SLIP and not has_begun(w, i)
+    return bool(slides and slip(m, w, i, w.rate) <= small_slip(s))
+
+
+@compiled
+def pulls_in_a_jam(s: Any, m: Model, w: Work, mode: Bytes) -> bool:
+    """Whether contacts jam at s.theta, beside one that would have let go just before: forces there are no motion's."""
+    jams, pulls = False, False
+    for i in range(s.nc):
+        jams = jams or (w.hit[i] <= s.theta and w.kind[i] == JAM)
+        pulls = pulls or (has_friction(m, i) and mode[i] == SLIP and not is_dry(m, i) and w.lam0[i] < 0.0)
+    return bool(jams and pulls)
+
+
+@compiled
+def drifts_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether contact i sticks no better than another one that has just been found not to."""
+    sticks = has_friction(m, i) and mode[i] == STICK and not is_dry(m, i)
+    return bool(sticks and 2.0 * slip(m, w, i, w.rate) > most_drift(s))
+
+
+@compiled
 def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
     """The mode that the fired guard of row i leads to.
 
@@ -289,6 +327,8 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return SLIP
     if kind == STOP:
         return STICK
+    if kind == JAM:
+        return int(mode[i])  # whether any other set of modes goes on is decided with all of them
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
         return int(mode[i])
     if s.frozen and m.beta[i, 0] > 0.0:

@@ -22,7 +22,7 @@ DRIFT = 10.0  # times as much as has no direction, from which on a contact that 
 TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes may be off
 
 (
-    BEGIN, FACTOR, SOLVE, RESPOND, STIFFNESS, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS,
+    BEGIN, FACTOR, SOLVE, RESPOND, DETERMINANT, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS,
     HOLDS_ON, BEGIN_SLIP, DECIDE,
 ) = np.arange(15)  # fmt: skip
 NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun
@@ -116,8 +116,10 @@ def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
             for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
                 w.slides[t] = 1
                 w.law[t, 0], w.law[t, 1], w.law[t, 2] = 0.0, 0.0, 0.0
-        elif has_begun(w, i):
-            count_from_none(m, w, i)
+        else:
+            w.within[i] = np.inf
+            if has_begun(w, i):
+                count_from_none(m, w, i)
 
 
 @compiled

@@ -9,6 +9,7 @@ from crossbody.reference.core.friction import (
     BEGIN,
     BEGIN_SLIP,
     DECIDE,
+    DETERMINANT,
     FACTOR,
     HOLDS_ON,
     MARGIN,
@@ -16,7 +17,6 @@ from crossbody.reference.core.friction import (
     RESPOND,
     SOLVE,
     STANDS,
-    STIFFNESS,
     TURN_PART,
     TURNING_RATE,
     TURNS_ASIDE,
@@ -33,7 +33,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     FACTOR          A from G; i = 1 if directions of slip turn; 1 if it is not finite
     SOLVE           w.la from w.r
     RESPOND         likewise, but for what slides with a bound of its own: how multipliers change with w.r
-    STIFFNESS       what a multiplier of contact i does to its own gap
+    DETERMINANT     how far the contacts that contact i, which slides, bears on are from a jam
     MARGIN          how far contact i is from sliding
     WATCH           either of all contacts, into w.cones[i]
     TURNING_RATE    fastest rate at which a slip turns, i = 1 of those that have just begun
@@ -41,7 +41,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     STANDS          1 if contact i has no slip velocity
     HOLDS_ON        1 if contact i, which sticks, surely does so throughout the step
     BEGIN           of a run: forget what another one left
-    RENEW           directions of slip after a step
+    RENEW           directions of slip after a step; 1 if contacts have stopped there, which are marked
     TURNS_ASIDE     1 if a contact whose slip falls to zero along its direction of reference has one across it there
     BEGIN_SLIP      of contacts that have reached their bounds, there
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
@@ -52,8 +52,8 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         coulomb.solve(s, m, w, w.r, w.la)
     elif what == RESPOND:
         coulomb.respond(s, m, w, w.r, w.la)
-    elif what == STIFFNESS:
-        return float(coulomb.stiffness(s, m, w, w.listed[i]))
+    elif what == DETERMINANT:
+        return float(coulomb.determinant(s, m, w, w.listed[i]))
     elif what == MARGIN:
         coulomb.without_pull(s, m, w)
         return float(coulomb.margin(m, w, i, w.la))
@@ -64,7 +64,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == TURN_PART:
         return float(coulomb.turn_part(s, m, w, i))
     elif what == RENEW:
-        coulomb.renew(s, m, w, w.rates[0])
+        return 1.0 if coulomb.renew(s, m, w, w.rates[0]) else 0.0
     elif what == TURNS_ASIDE:
         return 1.0 if coulomb.turns_aside(s, m, w) else 0.0
     elif what == STANDS:

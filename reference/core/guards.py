@@ -11,8 +11,8 @@ from crossbody.reference.core import dense
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate
 from crossbody.reference.core.algebra import ULP, inverse_diagonal
 from crossbody.reference.core.friction import (
+    DETERMINANT,
     MARGIN,
-    STIFFNESS,
     ask,
     bound,
     decided_to,
@@ -97,7 +97,7 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
 
 @compiled
 def _of_friction(K: Any, s: Any, m: Model, w: Work, what: int, i: int, t: float, y: Array) -> None:
-    """Leave in w.parts how far contact i is from sliding (MARGIN), or from a jam (STIFFNESS)."""
+    """Leave in w.parts how far contact i is from sliding (MARGIN), or from a jam (DETERMINANT)."""
     w.parts[0] = np.nan
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, y[: s.nq], y[s.nq :], GENERAL) == 0:
         w.parts[0] = ask(what, s, m, w, i)
@@ -122,7 +122,7 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
         lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)
         w.parts[0] = w.noise[i] - lam if lam > -np.inf else REDUNDANT
     elif kind in (CONE, JAM):
-        _of_friction(K, s, m, w, MARGIN if kind == CONE else STIFFNESS, i, t, w.ys)
+        _of_friction(K, s, m, w, MARGIN if kind == CONE else DETERMINANT, i, t, w.ys)
     elif kind == STOP:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         w.parts[0] = slip_along(m, w, i, w.rate)

@@ -33,9 +33,9 @@ HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to C
 SETS = 64  # of modes that are remembered while those of friction are decided
 OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
-    "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "down2", "across2", "weight",
-    "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by", "turning", "turned",
-    "pushed",
+    "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among", "seen",
+    "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by",
+    "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -144,6 +144,7 @@ STATE = np.dtype(
         ("determined_until", "f8"),  # s: from then on
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
+        ("jam", "i8"),  # contacts have just come to where they jam together
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding
         (
             "unsteady",
@@ -320,6 +321,9 @@ class Work:
     matrix: Floats2  # the system that is solved, and its factors
     down: Index
     across: Index
+    reached: Bytes  # places of rows that bear on each other,
+    among: Index  # the unknowns among them,
+    seen: Bytes  # and what is counted of these; scratch
     first: Floats2  # the same of the normal rows alone,
     second: Floats2  # and of what they leave of the sticking ones
     down2: Index
@@ -341,6 +345,11 @@ class Work:
     turn_by: Floats  # by how much each turns
     turning: Index  # their places
     turned: Index  # pivots
+    within: Floats  # (nc,) instant since which a contact slides without a direction; inf for one that has one
+    slid: Bytes  # contacts that slide before modes are decided
+    left2: Floats  # bounds of sticking rows,
+    part2: Floats  # what they bear of them,
+    share2: Floats  # and weights by which their loads are shared
     pushed: Floats  # (nc,) right-hand sides less what forces of rows do that slide with a bound of their own
 
 

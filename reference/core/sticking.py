@@ -19,7 +19,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import factor_lu, solve_lu
-from crossbody.reference.core.coulomb import factor_set, note_speed, respond, solve, stiffness, without_pull
+from crossbody.reference.core.coulomb import JAMMED, determinant, factor_set, note_speed, respond, solve, without_pull
 from crossbody.reference.core.friction import (
     bound,
     count_from_none,
@@ -42,6 +42,9 @@ AROUND, HALVINGS = 24, 50  # directions that are looked at where that leads nowh
 MOST_SETS = 256
 FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
+CLEAR_OF_A_JAM = 1e-5  # determinant, of rows of size 1, of what goes on where others jam
+BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
+IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 DIFFERENT = 1e-6  # part of the largest acceleration by which motions differ
 
 
@@ -68,6 +71,7 @@ def _look(s: Any, m: Model, w: Work) -> None:
         i = w.idx[j]
         if has_friction(m, i):
             size = slip(m, w, i, w.rate)
+            w.slid[i] = w.slides[i] and size > 0.0
             fresh = w.begins[i] or w.since[i] == s.t or (s.jumps and size <= small_slip(s))
             w.stands[i] = fresh or not w.slides[i]
             if not w.stands[i] and size > small_slip(s):
@@ -526,10 +530,44 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
+def _hold_what_stands(s: Any, m: Model, w: Work) -> None:
+    """Let contacts stick that would begin to slide, but go nowhere, if that is consistent too.
+
+    Such a set tells of a load that is shared up to the bounds, as contacts which others hold may do in any direction.
+    """
+    tried = False
+    for i in range(s.nc):
+        w.sets[0, i], w.kept_way[i] = w.state[i], w.way[i]
+    for j in range(s.na):
+        i = w.idx[j]
+        idle = has_friction(m, i) and w.stands[i] and w.state[i] == SLIP and not (w.begins[i] or is_dry(m, i))
+        if idle and _size(m, w, i, w.excess) <= IDLE * s.push_scale:
+            _put(m, w, i, STICK)
+            tried = True
+    if not tried or (_judge(s, m, w) < 0 and _jammed(s, m, w) < 0):
+        return
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i):
+            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
+                w.way[w.idx[c]] = w.kept_way[w.idx[c]]
+            _put(m, w, i, w.sets[0, i])
+    _judge(s, m, w)
+
+
+@compiled
 def _found(s: Any, m: Model, w: Work) -> bool:
     """Whether a consistent set is found, contacts as they are tried first."""
     _put_as_they_are(s, m, w)
     return bool(_iterate(s, m, w, ALL) or _swept(s, m, w, ALL) or _swept(s, m, w, WORST) or _near_sets(s, m, w))
+
+
+@compiled
+def _found_beside_a_jam(s: Any, m: Model, w: Work) -> bool:
+    """Whether contacts that have come to where they jam together go on without one of them, which is about to open."""
+    if s.jam:
+        s.leeway = max(s.leeway, BESIDE_A_JAM * s.push_scale)
+    return bool(s.jam and _found(s, m, w))
 
 
 @compiled
@@ -557,9 +595,10 @@ def decide(s: Any, m: Model, w: Work) -> int:
     s.leeway = 0.0
     _look(s, m, w)
     if not _found(s, m, w):
-        s.leeway = _most_pull(s, m, w)
-        if not (s.leeway > 0.0 and _found(s, m, w)):
+        s.leeway = max(_most_pull(s, m, w), decided_to(s))
+        if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
+    _hold_what_stands(s, m, w)
     _count_others(s, m, w)
     for j in range(s.na):
         i = w.idx[j]
@@ -577,6 +616,19 @@ def decide(s: Any, m: Model, w: Work) -> int:
 
 
 @compiled
+def _slide_on(s: Any, m: Model, w: Work) -> None:
+    """Evaluate the set in which all that slid do, however slowly, each along its slip."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and w.slid[i]:
+            size = slip(m, w, i, w.rate)
+            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
+                w.way[w.idx[c]] = (w.hda[c] - w.rest[w.idx[c]]) / size
+            _put(m, w, i, SLIP)
+    _evaluate(s, m, w)
+
+
+@compiled
 def _mark(s: Any, m: Model, w: Work) -> int:
     """Mark in w.wants the contact that has jammed, or all with friction; PAINLEVE or NO_CONSISTENT_MODES."""
     for j in range(s.na):
@@ -585,6 +637,9 @@ def _mark(s: Any, m: Model, w: Work) -> int:
             _put(m, w, i, STICK if w.stands[i] else SLIP)
     _evaluate(s, m, w)
     jammed = _jammed(s, m, w)
+    if jammed < 0:
+        _slide_on(s, m, w)
+        jammed = _jammed(s, m, w)
     w.wants[:] = 0
     for j in range(s.na):
         i = w.idx[j]
@@ -594,13 +649,19 @@ def _mark(s: Any, m: Model, w: Work) -> int:
 
 @compiled
 def _jammed(s: Any, m: Model, w: Work) -> int:
-    """The contact that slides and that its own force does not press, as the set stands; -1 if there is none.
+    """The contact that slides and that bears most of what is jammed as the set stands; -1 if nothing is.
 
-    One that no forces bring onto its law is at the very edge of that.
+    One that no forces bring onto its law is at the very edge of that. Where contacts have just come to a jam time does
+    not tell how near: a set that is nearly there is the same again.
     """
+    least = CLEAR_OF_A_JAM if s.jam else JAMMED
+    found, most, value, known = -1, -np.inf, 0.0, False
     for j in range(s.na):
         i = w.idx[j]
-        off = abs(w.excess[j]) > DIFFERENT * s.push_scale
-        if has_friction(m, i) and w.state[i] == SLIP and not is_dry(m, i) and (off or not stiffness(s, m, w, j) > 0.0):
-            return int(i)
-    return -1
+        if has_friction(m, i) and w.state[i] == SLIP and not is_dry(m, i):
+            if not (known and w.reached[j]):
+                value, known = determinant(s, m, w, j), True
+            off = abs(w.excess[j]) > DIFFERENT * s.push_scale
+            if (off or not value > least) and w.la[j] > most:
+                found, most = int(i), w.la[j]
+    return found

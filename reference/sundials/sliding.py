@@ -19,6 +19,7 @@ from crossbody.reference.sundials.equations import Ended, Equations
 
 DEPENDENT = 1e-10  # singular value over the largest, below which rows depend on each other
 LIGHT, SHARINGS = 1e-12, 3  # least part of the largest bound, and times that loads are shared anew
+MOST = 400  # projections between loads that hold and loads that can be borne
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +171,62 @@ class Sliding:
             weight = np.sqrt(np.maximum(bound, LIGHT * most) if most > 0.0 else np.ones(len(bound)))
             x[S] = weight * (np.linalg.pinv(B * weight, rcond=DEPENDENT) @ rest)
             x[N] = pressed - inverse @ A[N, S] @ x[S]
-        return x
+        borne = self._borne(seen, places, count, pressed, inverse @ A[N, S], B, x, size)
+        return x if borne is None else borne
 
-    def stiffness(self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats], i: int) -> float:
-        """What the multiplier of contact i does to its own gap, the others following their laws, 1/kg."""
+    def _borne(
+        self, seen: Seen, places: list[int], count: int, pressed: Floats, beside: Floats, B: Floats, x: Floats,
+        size: Floats,
+    ) -> Floats | None:  # fmt: skip
+        """Share the same load so that no contact bears more than it can, where one would; None if none would, or must.
+
+        By Douglas and Rachford: reflections at the sharings of the load, and at those that contacts can bear.
+        """
+        owner = [self.normal.get(seen.rows[k], -1) for k in places[count:]]
+        groups = {i: [k for k, other in enumerate(owner) if other == i] for i in dict.fromkeys(owner) if i >= 0}
+        scale, normals = size[count:], {i: places.index(seen.at[i]) for i in groups if i not in self.dry}
+
+        def bounds(x: Floats) -> dict[int, float]:
+            loads = {i: x[normals[i]] / size[normals[i]] if i in normals else 1.0 for i in groups}
+            return {i: self.mu[i] * max(load, 0.0) for i, load in loads.items()}
+
+        def within(y: Floats, bound: dict[int, float]) -> Floats:
+            y = y / scale
+            for i, rows in groups.items():
+                force = float(np.linalg.norm(y[rows]))
+                y[rows] *= min(1.0, bound[i] / force) if force > 0.0 else 1.0
+            return y * scale
+
+        def exceeds(x: Floats) -> bool:
+            most = bounds(x)
+            return any(float(np.linalg.norm((x[count:] / scale)[rows])) > most[i] for i, rows in groups.items())
+
+        if not exceeds(x):
+            return None
+        own, least = x[count:].copy(), np.linalg.pinv(B, rcond=DEPENDENT) @ B
+        y = own.copy()
+        for _ in range(MOST):
+            found = np.concatenate([pressed - beside @ (shared := y - least @ (y - own)), shared])
+            if not exceeds(found):
+                return found
+            y = y + within(2.0 * shared - y, bounds(found)) - shared
+        return None
+
+    def jam(self, seen: Seen, modes: Mapping[int, Mode], ways: Mapping[int, Floats], i: int) -> Floats:
+        """Eigenvalues of what forces of the contacts that contact i bears on do to their rows: none jams, none is < 0.
+
+        Of one contact alone it is Painleve's p. Rows that depend on each other are moved as by springs that are alike,
+        so that only what independent ones are moved by counts.
+        """
         places, _, A, size = self.system_of(seen, modes, ways)
-        k = places.index(seen.at[i])
-        inverse = np.linalg.pinv(A, rcond=DEPENDENT)[k, k]
-        return float(size[k] ** 2 / inverse) if inverse != 0.0 else np.inf
+        owners = [self.normal.get(row, row) for row in seen.rows]
+        moved = (seen.G != 0.0) | np.equal.outer(owners, owners)
+        reached = moved[seen.at[i]]
+        while (more := moved[reached].any(axis=0)).sum() > reached.sum():
+            reached = more
+        both = np.ix_(reached[places], reached[places])
+        A, G = A[both], (seen.G[np.ix_(places, places)] / np.outer(size, size))[both]
+        values, vectors = np.linalg.eigh(G)
+        base = vectors[:, values > DEPENDENT * values[-1]]
+        found: Floats = np.linalg.eigvals(base.T @ A @ base)
+        return found

@@ -120,6 +120,15 @@ def test_published_digits() -> None:
     assert belt.v[0, 0] + 0.1 == pytest.approx(-0.0383283445633638, abs=1e-15)
 
 
+@pytest.mark.parametrize("variant", cases.variants("tossed_cube"))
+def test_a_tossed_cube_ends_alike_at_any_tolerance(variant: str) -> None:
+    """Its corners touch, slide and stick some dozen times: what one tolerance decides otherwise ends elsewhere."""
+    case = cases.load("tossed_cube", variant)
+    ends = [ran(case, rtol).q[-1] for rtol in (1e-6, 1e-9, 1e-11)]
+    assert np.abs(ends[0] - ends[2]).max() < 1e-5
+    assert np.abs(ends[1] - ends[2]).max() < 1e-8
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_any_block_and_any_sphere_move_as_their_exact_motions(seed: int) -> None:
     rng = np.random.default_rng(seed)

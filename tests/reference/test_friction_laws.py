@@ -30,9 +30,8 @@ from crossbody.reference import System, simulate
 from crossbody.reference.linear import linearise
 from crossbody.reference.tree.system import system
 
-CYCLING = {158}  # an edge slides at mu = 0.97: its ends press in turn, until at one instant no set of modes holds
 FURTHER = (1090, 1481, 2129, 2629)
-QUICK = (*range(60), 70, 147, 210, 240, 264, 304, 325, 417, 499, 536, 572, *FURTHER)  # each broke one rule or another
+QUICK = (*range(60), 70, 147, 158, 210, 240, 264, 304, 325, 417, 499, 536, 572, *FURTHER)  # each broke some rule
 STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
 DRIFT = 1e3  # times rtol, of the largest speed: a contact that sticks is no faster
 
@@ -52,7 +51,7 @@ def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
 def test_cones_power_and_energy_of_bodies_with_edges(seed: int) -> None:
     scene, q0, v0, mu = tossed(seed, EDGED, 1)
     run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=150_000)
-    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE) or seed in CYCLING, run_.message
+    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), run_.message
     obeys(scene, run_, mu, 1e-6)
 
 

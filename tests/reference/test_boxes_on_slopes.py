@@ -1,0 +1,184 @@
+"""Boxes that fall on slopes with much friction: no motion ends but where none goes on (Painleve), and it is told."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import box_on_floor, run
+
+from crossbody import cases
+from crossbody.cases import Mode, Outcome, Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import RowLaw
+from crossbody.reference import simulate
+from crossbody.reference.sundials.equations import Equations
+from crossbody.reference.sundials.sliding import Sliding
+from crossbody.reference.tree.system import system
+
+SLOPE = """<mujoco><worldbody>
+  <geom name="floor" type="plane" size="5 5 .1" euler="0 10 0" friction=".5"/>
+  <body name="box" pos="0 0 .5"><freejoint/><geom type="box" size=".1 .1 .1" mass="1"/></body>
+</worldbody></mujoco>"""
+PARTED = 1e-6  # m
+ROUND = 40  # directions in which contacts that stand are tried to slide
+GREAT = 1e5  # times gravity: forces that are no motion's any more
+NEAR = 1e-3  # of the place where forces jam
+MOST_STEPS = 10_000  # of a run in which nothing creeps
+
+
+def events(found: Trajectory) -> list[tuple[float, int, Mode]]:
+    """Return what contacts change; when one drifts too far to stick depends on the tolerance."""
+    return sorted((round(e.t, 5), e.contact, e.after) for e in found.events)
+
+
+@pytest.fixture(scope="module")
+def slope(tmp_path_factory: pytest.TempPathFactory) -> cases.Case:
+    path = tmp_path_factory.mktemp("slope") / "slope.xml"
+    Path(path).write_text(SLOPE)
+    return cases.from_file(str(path), friction=1)
+
+
+def test_a_box_that_falls_on_its_edge_is_followed_by_both(slope: cases.Case) -> None:
+    """Two corners touch while two stick below the surface; where these join again all do, until two have to slide."""
+    made = system(slope.scene, slope.law)
+    at = np.linspace(0.0, 0.32, 65)
+    one = simulate(made, slope.q0, slope.v0, 0.32, rtol=1e-10, samples=at)
+    other = simulate(made, slope.q0, slope.v0, 0.32, rtol=1e-9, samples=at, solver="cvode")
+    assert one.outcome is other.outcome is Outcome.FINISHED, other.message
+    assert events(one) == events(other)
+    assert np.abs(one.q - other.q).max() < 1e-9
+    assert np.abs(one.v - other.v).max() < 1e-7
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
+def test_a_box_that_falls_on_its_edge_comes_to_rest(slope: cases.Case, rtol: float) -> None:
+    """It rocks from edge to edge, ever faster, and creeps nowhere: the same place at any tolerance."""
+    made = system(slope.scene, slope.law)
+    found = simulate(made, slope.q0, slope.v0, 1.0, rtol=rtol, max_steps=MOST_STEPS)
+    assert found.outcome is Outcome.FINISHED, found.message
+    assert found.q[-1, 0] == pytest.approx(0.01545844, abs=1e-6)
+    assert np.abs(found.q[-1, 1]) < 1e-7
+    assert np.abs(found.v[-1]).max() < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_box_that_nearly_falls_on_its_edge_goes_on(slope: cases.Case, seed: int) -> None:
+    """Three corners would jam together; without one of them the others go on, and no law says which."""
+    made, q0 = system(slope.scene, slope.law), slope.q0.copy()
+    q0[:7] += 1e-6 * np.random.default_rng(seed).normal(size=7)
+    q0[3:7] /= np.linalg.norm(q0[3:7])
+    found = simulate(made, q0, slope.v0, 0.6, rtol=1e-9, ledger=True, max_steps=MOST_STEPS)
+    assert found.outcome is Outcome.FINISHED, found.message
+    assert found.determined_until < 0.6
+
+
+def dropped(seed: int) -> tuple[Any, np.ndarray, float]:
+    """A box over a slope, on an edge or anyhow, and the coefficient of friction."""
+    rng = np.random.default_rng(seed)
+    tilt, mu = float(np.deg2rad(rng.uniform(0.0, 40.0))), float(rng.uniform(0.0, 1.5))
+    half = tuple(rng.uniform(0.05, 0.2, 3).tolist())
+    law = RowLaw(a0=float(10 ** rng.uniform(3, 4.5)), a1=float(rng.uniform(50, 200)))
+    turn = rng.normal(size=4) if seed % 2 else np.array([1.0, 0.0, rng.uniform(-0.4, 0.4), 0.0])
+    return box_on_floor(mu, half=half, tilt=tilt, law=law), np.array([0, 0, 0.4, *(turn / np.linalg.norm(turn))]), mu
+
+
+def goes_on(scene: Any, found: Trajectory) -> bool:
+    """Whether any set of modes of the contacts that close agrees with its forces where a run ended: all are tried.
+
+    Sets that jam, as springs at all contacts alike would have it, and forces beyond all measure do not count.
+    """
+    made = system(scene, case_of(scene).law)
+    e = Equations(made)
+    rows, t, q, v = Sliding(made, e), float(found.t[-1]), found.q[-1].copy(), found.v[-1].copy()
+    gap, rate = (a.copy() for a in e.gaps(t, q, v))
+    closed = [i for i in rows.ways if gap[i] <= 1e-12 and (rate[i] < 0.0 or Mode(int(found.mode[-1][i])) in (6, 7))]
+    seen = rows.see(t, q, v, closed)
+    G, bare, mu = seen.G, seen.bare, rows.mu
+    choices = []
+    for i in closed:
+        slip = rows.slip(seen, i)
+        size = float(np.linalg.norm(slip))
+        if size > 1e-6:
+            choices.append([None, slip / size])
+        else:
+            angles = 2.0 * np.pi * np.arange(ROUND) / ROUND
+            choices.append([None, 0, *(np.array([np.cos(a), np.sin(a)]) for a in angles)])
+    for chosen in product(*choices):
+        W, use = [], []
+        for i, one in zip(closed, chosen, strict=True):
+            n, ways = seen.at[i], [seen.at[k] for k in rows.ways[i]]
+            if one is None:
+                continue
+            if isinstance(one, int):
+                use += [(n, np.eye(len(G))[n]), *((k, np.eye(len(G))[k]) for k in ways)]
+            else:
+                column = np.eye(len(G))[n]
+                column[ways] = -mu[i] * one
+                use.append((n, column))
+        if not use:
+            lam = np.zeros(len(G))
+        else:
+            at, W = [k for k, _ in use], np.array([column for _, column in use]).T
+            A = (G @ W)[at]
+            base = np.linalg.svd(G[np.ix_(at, at)])
+            Q = base[0][:, base[1] > 1e-10 * base[1][0]]
+            values = np.linalg.eigvals(Q.T @ A @ Q)
+            if (values.real[np.abs(values.imag) < 1e-12] < NEAR * np.abs(values).max()).any():
+                continue
+            lam = W @ np.linalg.lstsq(A, bare[at], rcond=1e-10)[0]
+        excess, scale = G @ lam - bare, np.abs(bare).max()
+        good = np.abs(lam).max() < GREAT
+        for i, one in zip(closed, chosen, strict=True):
+            n, ways = seen.at[i], [seen.at[k] for k in rows.ways[i]]
+            if one is None:
+                good &= excess[n] > -1e-6 * scale
+            else:
+                good &= lam[n] > 0.0 and abs(excess[n]) < 1e-6 * scale
+            if isinstance(one, int):
+                good &= np.linalg.norm(lam[ways]) <= mu[i] * lam[n] * (1.0 + 1e-6)
+            elif one is not None and len(choices[closed.index(i)]) > 2:
+                good &= excess[ways] @ one >= np.cos(2.0 * np.pi / ROUND) * np.linalg.norm(excess[ways])
+        if good:
+            return True
+    return False
+
+
+def jams(scene: Any, found: Trajectory) -> bool:
+    """Whether all contacts that close, each sliding along its slip, have come to where they jam together."""
+    made = system(scene, case_of(scene).law)
+    rows = Sliding(made, e := Equations(made))
+    t, q, v = float(found.t[-1]), found.q[-1].copy(), found.v[-1].copy()
+    gap, rate = (a.copy() for a in e.gaps(t, q, v))
+    closed = [i for i in rows.ways if gap[i] <= 1e-12 and rate[i] < 0.0]
+    seen = rows.see(t, q, v, closed)
+    ways = {i: slip / np.linalg.norm(slip) for i in closed if (slip := rows.slip(seen, i)).any()}
+    return min(abs(rows.jam(seen, dict.fromkeys(closed, Mode.SLIP), ways, closed[0]))) < 1e-6
+
+
+@pytest.mark.parametrize("seed", [*range(14), *(pytest.param(k, marks=pytest.mark.slow) for k in range(14, 60))])
+def test_a_box_dropped_on_a_slope_ends_only_where_nothing_goes_on(seed: int) -> None:
+    scene, q0, _ = dropped(seed)
+    found = run(scene, q0, np.zeros(6), 0.8, rtol=1e-9, max_steps=MOST_STEPS)
+    assert np.isfinite(found.q).all()
+    assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
+    assert found.outcome is Outcome.FINISHED or not goes_on(scene, found) or jams(scene, found)
+
+
+@pytest.mark.parametrize("seed", [0, 4, 10, *(pytest.param(k, marks=pytest.mark.slow) for k in (13, 16, 17, 31))])
+def test_both_machines_drop_a_box_alike_as_far_as_the_law_says(seed: int) -> None:
+    scene, q0, _ = dropped(seed)
+    until = min(0.4, run(scene, q0, np.zeros(6), 0.4, rtol=1e-9).determined_until)
+    at = np.linspace(0.0, until, 41)
+    one, near, other = (
+        run(scene, q0 + step, np.zeros(6), until, rtol=rtol, samples=at, solver=solver)
+        for step, rtol, solver in ((0.0, 1e-10, "compiled"), (1e-9, 1e-10, "compiled"), (0.0, 1e-9, "cvode"))
+    )
+    assert one.outcome is other.outcome, other.message
+    parted = np.flatnonzero(np.abs(one.q - near.q).max(axis=1) > PARTED)  # neighbours have: no tolerance holds behind
+    last = int(parted[0]) if len(parted) else len(at)
+    assert last > 20
+    assert np.abs(one.q - other.q)[:last].max() < PARTED
