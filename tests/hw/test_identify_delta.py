@@ -37,7 +37,7 @@ def test_parameters_and_delay_are_recovered(plant: hw.Plant) -> None:
     found = fits(plant, range(2))
     assert all(fit.success for fit in found)
     told = [warning for fit in found for warning in fit.warnings]
-    assert all("hardly be told apart" in warning for warning in told)  # m1 and m3: the log is short
+    assert all("can hardly be separated" in warning for warning in told)  # m1 and m3: the log is short
     assert min(inside(found).values()) >= 1
     for fit in found:
         assert fit["delay"].value == pytest.approx(TRUE["delay"], abs=1e-4)

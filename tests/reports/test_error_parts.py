@@ -22,6 +22,7 @@ from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisati
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
+from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, from_run
 from crossbody.reports.runs import choice, jobs
@@ -385,7 +386,7 @@ def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: p
     )
     pick, swing = choice.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
     told = [jobs.run_case(swing, [pick], truth=None).entries[0].study]
-    monkeypatch.setattr(jobs, "STUDIES_S", 0.0)
+    monkeypatch.setattr(jobs, "OF_STUDIES", 0.0)
     told.append(jobs.run_case(swing, [pick], truth=None).entries[0].study)
     assert [study is not None and len(study.runs) > 1 for study in told] == [True, False]
     assert told[1] is not None
@@ -400,7 +401,7 @@ def test_a_study_has_as_many_steps_as_there_is_time_for(monkeypatch: pytest.Monk
     )
     pick, swing = choice.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
     for seconds, count in ((10.0, 6), (4.5, 4), (3.0, 3), (2.9, 0)):
-        monkeypatch.setattr(jobs, "STUDIES_S", seconds)
+        monkeypatch.setattr(jobs, "OF_STUDIES", seconds / BUDGET)
         told = jobs.run_case(swing, [pick], truth=None).entries[0].study
         assert told is not None
         assert len(told.runs) == count
