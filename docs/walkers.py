@@ -1,4 +1,4 @@
-"""The table of walking robots in README.md, measured: `make walkers` writes it anew, in some minutes.
+"""The table of walking robots in docs/explanation/contacts.md, measured: `make walkers` writes it anew, in minutes.
 
 The robots are the files of gymnasium's wheel, under motors whose controls are drawn once (seed 0) and held as long as
 gymnasium holds an action.
@@ -20,7 +20,7 @@ from crossbody.reports.judging.verdict import Row
 from crossbody.reports.runs.choice import picks
 from crossbody.reports.runs.jobs import run_case
 
-README = Path(__file__).parent.parent / "README.md"
+PAGE = Path(__file__).parent / "explanation" / "contacts.md"
 HELD = {"hopper": 0.008, "half_cheetah": 0.05, "ant": 0.05, "walker2d": 0.008, "humanoid": 0.015}
 """Robot -> how long gymnasium holds an action, s."""
 T_END, BUDGET = 1.0, 15.0
@@ -30,15 +30,15 @@ T_END, BUDGET = 1.0, 15.0
 def main() -> None:
     """Measure, and put the table in its place."""
     rows = [row_of(name) for name in sys.argv[1:] or HELD]
-    head = ("Robot", "Compared", "Known by", "Reference", "MuJoCo as it stands", "Its model", "Its step")
+    head = ("Robot", "Compared", "Known by", "Reference", "MuJoCo as it stands")
     table = markdown(head, rows)
     print(table)
     if not sys.argv[1:]:
-        README.write_text(replaced(README.read_text(encoding="utf-8"), {"walkers": table}), encoding="utf-8")
+        PAGE.write_text(replaced(PAGE.read_text(encoding="utf-8"), {"walkers": table}), encoding="utf-8")
 
 
 def row_of(name: str) -> tuple[object, ...]:
-    """One robot: errors of position over the motion, and parts of the worst one."""
+    """One robot: how far it is compared, and errors of position over the motion."""
     found = find_spec("gymnasium")
     if found is None or found.origin is None:
         raise SystemExit("The robots are gymnasium's, which is not installed: pip install gymnasium.")
@@ -52,7 +52,6 @@ def row_of(name: str) -> tuple[object, ...]:
     return (
         f"`{name}.xml`", f"{until:.3g} s", f"two witnesses ({truth['tier']})" if truth["tier"] == "C" else "itself (D)",
         size(rows, "reference", "position"), size(rows, "mujoco", "position"),
-        size(rows, "mujoco", "position (model)"), size(rows, "mujoco", "position (step)"),
     )  # fmt: skip
 
 
