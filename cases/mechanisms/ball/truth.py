@@ -73,9 +73,8 @@ def release_time(ball: Ball, h: float, v: float) -> float:
     if math.isinf(low) or float(acceleration(start + low)) + ball.gravity >= 0.0:
         return math.inf
     early, late = start, start + low
-    while (
-        early < (middle := 0.5 * (early + late)) < late
-    ):  # to the last bit, at a thousandth of what SciPy takes to import
+    # To the last bit, at a thousandth of what SciPy takes to import.
+    while early < (middle := 0.5 * (early + late)) < late:
         early, late = (middle, late) if float(acceleration(middle)) + ball.gravity > 0.0 else (early, middle)
     return late
 
