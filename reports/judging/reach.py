@@ -50,30 +50,29 @@ class Followed:
     why: str = ""
 
 
-def followed(case: Case, budget: float = BUDGET) -> Followed:
-    """Return a case with the tightest tolerance that rounding leaves it, up to where its motion gets in time.
-
-    Stiff rows on small masses reach theirs before, and many contacts that switch often take long.
+def followed(case: Case, budget: float | None = None) -> Followed:
+    """Return a case with the tightest tolerance that rounding leaves it, up to where its motion gets.
 
     Args:
         case: the scene.
-        budget: time that a run may take, s.
+        budget: time that a run may take, s; the horizon ends where it does, or the law. None: the horizon stays.
     """
     if not case.general:
         return Followed(case, tight(case))
-    coarse = _run(case, COARSE, time_limit=budget)
-    most = MANY * max(coarse.steps, LEAST)
-    cut = cut_short(case, coarse)
-    for bound in (*({"max_steps": most, "times": times} for times in LADDER), {"times": 10.0 * LADDER[-1]}):
-        times = bound.pop("times")
+    bound = {} if budget is None else {"time_limit": budget}
+    coarse = motion(case, COARSE, **bound)
+    most = {"max_steps": MANY * max(coarse.steps, LEAST)}
+    cut = case if budget is None else cut_short(case, coarse)
+    for times, steps in (*((times, most) for times in LADDER), (10.0 * LADDER[-1], {})):
         tried = replace(cut, tight=times * case.tight)
-        motion = tight(tried, time_limit=budget, **bound)
-        if motion.outcome is not Outcome.STEP_LIMIT:
+        found = tight(tried, **bound, **steps)
+        if found.outcome is not Outcome.STEP_LIMIT:
             break
-    last, ended = cut_short(tried, motion), coarse if cut is not case else motion
+    last = tried if budget is None else cut_short(tried, found)
+    ended = coarse if last is tried else found
     if last is not tried:
-        motion, ended = tight(last), motion
-    return Followed(last, motion, last.t_end / case.t_end, SHORT[ended.outcome] if last.t_end < case.t_end else "")
+        found = tight(last)
+    return Followed(last, found, last.t_end / case.t_end, SHORT[ended.outcome] if last.t_end < case.t_end else "")
 
 
 def cut_short(case: Case, run: Trajectory) -> Case:
@@ -94,11 +93,11 @@ def tight(case: Case, **bound: Any) -> Trajectory:
     return load("reference").prepare(case, "compiled", rtol=case.tight, **bound).run()
 
 
-def _run(case: Case, rtol: float, **bound: Any) -> Trajectory:
-    """A run whose shapes nobody looks at: those of the truth's own run are seen."""
+def motion(case: Case, rtol: float, **settings: Any) -> Trajectory:
+    """A run of the reference whose shapes nobody looks at: those of the truth's own run are seen."""
     from crossbody.engines import load
 
-    prepared: Any = load("reference").prepare(case, "compiled", rtol=rtol, **bound)
+    prepared: Any = load("reference").prepare(case, "compiled", rtol=rtol, **settings)
     found: Trajectory = prepared.motion()
     return found
 

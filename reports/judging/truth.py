@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reports.judging.answers import Answers
-from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, tight
+from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, motion, tight
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
@@ -48,8 +47,8 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
 
     Args:
         case: the scene.
-        known: the case as far as it is followed, where that was found before.
-        budget: time that its tightest run may take, s.
+        known: the case as far as it is followed, with which motions are compared then; else to its whole horizon.
+        budget: by which the time of its witness is measured, s.
 
     Raises:
         CrossbodyError: if the reference cannot run the case.
@@ -60,18 +59,18 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
     arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: any other truth is known by itself only.
-        known = followed(case, budget) if known is None else known
+        known = followed(case) if known is None else known
         case, first = known.case, known.motion
         apart = case.fsm == "level" and engines.load("reference").why_not(case, "cvode") is None
         found = _integrated(case, first, "cvode" if apart else "compiled", budget=budget)
         return replace(found, part=known.part, short=known.why)
-    motion = case.closed_form
-    first = motion(np.zeros(1))
+    exact = case.closed_form
+    first = exact(np.zeros(1))
     truth = Truth(
         tier=Tier.A,
         source="closed form of every arc, which shares the numbers of the case alone with what it judges",
-        trajectory=motion(sample_times(first, case.t_end)),
-        at=motion,
+        trajectory=exact(sample_times(first, case.t_end)),
+        at=exact,
         agreement={},
         joined=case.general,
     )
@@ -102,22 +101,13 @@ def law_of(case: Case) -> Truth | None:
     return replace(found, source=rule + found.source)
 
 
-def _motion(prepared: Any) -> Trajectory:
-    """A run of the reference whose shapes nobody looks at: those of the truth's own run were seen."""
-    run: Trajectory = prepared.motion()
-    return run
-
-
 def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget: float = BUDGET) -> Truth:
     """The compiled integrator at its tightest, held against another solver: tier C if that is independent, else D."""
     from crossbody.cases.scene_contacts import frictional
-    from crossbody.engines import load
-
-    reference = load("reference")
 
     @Answers
     def at(times: Floats) -> Trajectory:
-        run = _motion(reference.prepare(case, "compiled", rtol=case.tight, samples=np.array(times)))
+        run = motion(case, case.tight, samples=np.array(times))
         # A run that is asked for samples need not take the same steps: its events move by the tolerance.
         run = replace(with_both_sides(run, first), events=first.events, switches=first.switches)
         return run if first.outcome.ok else replace(run, outcome=first.outcome, message=first.message)
@@ -253,7 +243,6 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) 
     fastest = float(np.max(np.abs(truth.v), initial=0.0))
     if not case.general or not truth.outcome.ok or not RESTS < fastest < math.inf:
         return np.array([0.0, case.t_end]), np.ones(2)
-    from crossbody.engines import load
     from crossbody.engines.equations import system_of
 
     rng, system, t = np.random.default_rng(0), system_of(case), np.linspace(0.0, case.t_end, INSTANTS)
@@ -263,7 +252,7 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) 
         way -= np.linalg.lstsq(held, held @ way, rcond=None)[0] if len(held) else 0.0
         off = NUDGE * fastest
         nudged = replace(case, v0=case.v0 + off * way)
-        run = _motion(load("reference").prepare(nudged, "compiled", rtol=case.tight, samples=t))
+        run = motion(nudged, case.tight, samples=t)
         if run.outcome.ok:
             apart = np.max(differences(run.q, exact, case.quaternions), axis=1)
             most = np.maximum(most, np.maximum.accumulate(apart) / (off * case.t_end))

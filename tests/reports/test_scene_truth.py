@@ -193,6 +193,15 @@ def test_a_motion_is_compared_up_to_where_the_law_has_none_further() -> None:
     assert ended[0] is Outcome.FINISHED
 
 
+def test_a_truth_by_itself_keeps_its_horizon() -> None:
+    """What asks for the truth of a case compares runs of that case, which are no shorter for it."""
+    case = cases.from_scene(rod_on_floor(1.6), q0=[0.0, 0.5 * np.cos(0.5) + 0.05, -0.5], v0=[1.5, 0.0, 0.0], t_end=0.3)
+    truth, whole = truth_of(case), engines.load("reference").prepare(case, "compiled", rtol=case.tight).run()
+    assert truth.part == 1.0
+    assert truth.trajectory.outcome is Outcome.PAINLEVE
+    assert truth.trajectory.t[-1] == pytest.approx(whole.t[-1], rel=1e-9)
+
+
 @pytest.mark.parametrize("outcome", [*SHORT, Outcome.STEP_LIMIT, Outcome.MODE_CYCLE, Outcome.FINISHED])
 @given(reached=st.floats(0.0, 1.0), t_end=st.floats(1e-3, 1e3))
 def test_a_horizon_is_cut_at_two_digits_below_what_was_reached(outcome: Outcome, reached: float, t_end: float) -> None:
