@@ -454,13 +454,10 @@ def start_digit(state: int) -> int:
 def _near_sets(s: Any, m: Model, w: Work) -> bool:
     """Try sets by the number of contacts in which they differ from the present one; whether one is consistent."""
     _sweep(s, m, w)
+    _keep(s, w)
     contacts = 0
-    for i in range(s.nc):
-        w.sets[0, i] = w.state[i]
     for j in range(s.na):
         contacts += has_friction(m, w.idx[j])
-    for i in range(s.nc):
-        w.kept_way[i] = w.way[i]
     tried, all_sets = 0, 4 ** min(contacts, 12)
     for differing in range(1, contacts + 1):
         for number in range(all_sets):
@@ -494,6 +491,24 @@ def begin_slip(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
+def _keep(s: Any, w: Work) -> None:
+    """Keep the modes and directions of a set, before others are tried."""
+    for i in range(s.nc):
+        w.sets[0, i], w.kept_way[i] = w.state[i], w.way[i]
+
+
+@compiled
+def _put_back(s: Any, m: Model, w: Work) -> None:
+    """Put contacts back into the set that was kept."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i):
+            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
+                w.way[w.idx[c]] = w.kept_way[w.idx[c]]
+            _put(m, w, i, w.sets[0, i])
+
+
+@compiled
 def _count_others(s: Any, m: Model, w: Work) -> None:
     """Note whether another set is consistent as well and leads to another motion, where there are few to try."""
     contacts, standing = 0, 0
@@ -502,8 +517,7 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
         standing += has_friction(m, w.idx[j]) and w.stands[w.idx[j]]
     if contacts > FEW or standing == 0:
         return
-    for i in range(s.nc):
-        w.sets[0, i], w.kept_way[i] = w.state[i], w.way[i]
+    _keep(s, w)
     _evaluate(s, m, w)
     for j in range(s.na):
         w.chosen[j] = w.excess[j]
@@ -521,12 +535,7 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
             for j in range(s.na):
                 found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
     s.not_unique += found
-    for j in range(s.na):
-        i = w.idx[j]
-        if has_friction(m, i):
-            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
-                w.way[w.idx[c]] = w.kept_way[w.idx[c]]
-            _put(m, w, i, w.sets[0, i])
+    _put_back(s, m, w)
 
 
 @compiled
@@ -536,8 +545,7 @@ def _hold_what_stands(s: Any, m: Model, w: Work) -> None:
     Such a set tells of a load that is shared up to the bounds, as contacts which others hold may do in any direction.
     """
     tried = False
-    for i in range(s.nc):
-        w.sets[0, i], w.kept_way[i] = w.state[i], w.way[i]
+    _keep(s, w)
     for j in range(s.na):
         i = w.idx[j]
         idle = has_friction(m, i) and w.stands[i] and w.state[i] == SLIP and not (w.begins[i] or is_dry(m, i))
@@ -546,12 +554,7 @@ def _hold_what_stands(s: Any, m: Model, w: Work) -> None:
             tried = True
     if not tried or (_judge(s, m, w) < 0 and _jammed(s, m, w) < 0):
         return
-    for j in range(s.na):
-        i = w.idx[j]
-        if has_friction(m, i):
-            for c in range(_first(m, w, i), _first(m, w, i) + m.tangents[i]):
-                w.way[w.idx[c]] = w.kept_way[w.idx[c]]
-            _put(m, w, i, w.sets[0, i])
+    _put_back(s, m, w)
     _judge(s, m, w)
 
 
