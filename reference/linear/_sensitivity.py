@@ -16,7 +16,7 @@ from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
-from crossbody.reference.linear._derivatives import Point, turning
+from crossbody.reference.linear._point import Point, turning
 from crossbody.reference.linear._variation import (
     Theta,
     bounced,
