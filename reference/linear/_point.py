@@ -32,6 +32,7 @@ class Point:
         sharing: these and those that they follow from, but for rows that nothing moves.
         held: places in `active` of the idle rows.
         solved: places in `active` of the rows that are solved for: neither idle nor tangential ones of what slides.
+        slid: every contact that slides, with the places of its normal row, -1 for dry friction, and of its tangents.
     """
 
     system: System
@@ -50,11 +51,15 @@ class Point:
     sharing: Index = field(default_factory=lambda: NO_ROWS)
     held: Index = field(init=False)
     solved: Index = field(init=False)
+    slid: tuple[tuple[int, int, Index], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         """Find the rows that are solved for."""
         held = np.flatnonzero(np.isin(self.active, self.idle)) if len(self.idle) else NO_ROWS
-        off = np.concatenate([held, *(self.tangents(i) for i in self.sliding.tolist())])
+        where = {i: k for k, i in enumerate(self.active.tolist())} if len(self.sliding) else {}
+        slid = tuple((i, -1 if self.system.dry[i] else where[i], self.tangents(i)) for i in self.sliding.tolist())
+        off = np.concatenate([held, *(places for _, _, places in slid)])
+        object.__setattr__(self, "slid", slid)
         object.__setattr__(self, "held", held)
         object.__setattr__(self, "solved", np.delete(np.arange(len(self.active)), off))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from crossbody.cases import SceneError
-from crossbody.reference.kinds import Array, Floats
+from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear._point import Point, dense, terms
 
 DEPENDENT = 1e-5  # part of a row, of size 1, that does not follow from others, below which it does
@@ -23,21 +23,27 @@ def borne(at: Point, H: Array, v: Array, lam: Array) -> Array:
         return lam
     found = np.zeros((len(at.active), *lam.shape[1:]), np.result_type(H, v, lam, at.given("friction")))
     found[at.solved] = lam
-    for i in at.sliding.tolist():
-        bound = at.given("friction")[i]
-        if not at.system.dry[i]:
-            bound = bound * found[at.active.tolist().index(i)]
-        for row, s in zip(at.tangents(i).tolist(), _direction(at, H, v, i), strict=True):
+    for i, normal, places in at.slid:
+        bound = at.given("friction")[i] * (1.0 if normal < 0 else found[normal])
+        for row, s in zip(places.tolist(), _direction(at, H, v, places), strict=True):
             found[row] = -bound * s
     return found
 
 
-def _direction(at: Point, H: Array, v: Array, i: int) -> Array:
-    """Direction (1,) or (2,) in which contact i slides."""
-    rows = at.active[at.tangents(i)]
-    if at.way is not None and not np.isnan(at.way[rows]).any():
-        return at.way[rows]
-    slip = H[at.tangents(i)] @ v - at.given("drift")[rows]
+def given_way(at: Point, rows: Index) -> Floats | None:
+    """The direction in which these tangential rows slide, if it is given."""
+    if at.way is None or np.isnan(at.way[rows]).any():
+        return None
+    return at.way[rows]
+
+
+def _direction(at: Point, H: Array, v: Array, places: Index) -> Array:
+    """Direction (1,) or (2,) in which the contact slides whose tangential rows stand there."""
+    rows = at.active[places]
+    way = given_way(at, rows)
+    if way is not None:
+        return way
+    slip = H[places] @ v - at.given("drift")[rows]
     direction: Array = slip / np.sqrt(slip @ slip)  # of a complex step too
     return direction
 
@@ -103,10 +109,9 @@ def check_idle(at: Point, H: Floats, vd: Floats, law: Floats, free: Floats) -> N
 
 def check_slips(at: Point, H: Floats) -> None:
     """Refuse a contact that slides at no speed in a direction that is not given."""
-    for i in at.sliding.tolist():
-        places = at.tangents(i)
+    for i, _, places in at.slid:
         rows = at.active[places]
-        if at.way is not None and not np.isnan(at.way[rows]).any():
+        if given_way(at, rows) is not None:
             continue
         drift = at.given("drift")[rows]
         slip, size = H[places] @ at.v - drift, np.abs(H[places]) @ np.abs(at.v) + np.abs(drift)

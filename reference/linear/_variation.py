@@ -82,6 +82,23 @@ def gradient(function: Callable[[Point, Array, Array], Array], at: Point, over: 
     return np.stack(columns, axis=-1)
 
 
+def rates(at: Point) -> Floats:
+    """Rates (v, v') (2 n,)."""
+    return np.concatenate([at.v, saddle(at)[1]])
+
+
+def flow(at: Point, over: Theta) -> tuple[Floats, Floats]:
+    """Rates (v, v') (2 n,), and the derivative of v' by (dq, v, theta).
+
+    Raises:
+        SceneError: as `slopes`.
+    """
+    K, vd, lam = saddle(at)
+    columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
+    solved = np.asarray(np.linalg.solve(K, columns[: len(K)]), dtype=np.float64)
+    return np.concatenate([at.v, vd]), -solved[: at.system.n]
+
+
 def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
     """Rates (v, v') (2 n,), multipliers (na,), and the derivatives of (v', lam) by (dq, v, theta).
 
@@ -111,6 +128,31 @@ def gap_gradient(at: Point, over: Theta, i: int, *, rate: bool = False) -> Float
     """Of gap i, or of its rate."""
     place = i + at.system.nc * rate
     return gradient(lambda here, q, v: gaps(here, q, v)[place], at, over)
+
+
+def slips(at: Point, q: Array, v: Array, i: int) -> Array:
+    """Slip velocity (1,) or (2,) of contact i."""
+    rows = int(at.system.tangent[i]) + np.arange(int(at.system.tangents[i]))
+    found: Array = gaps(at, q, v)[at.system.nc + rows] - at.given("drift")[rows]
+    return found
+
+
+def slip_gradient(at: Point, over: Theta, i: int) -> Floats:
+    """Of the slip velocity of contact i (1 or 2, ...)."""
+    return gradient(lambda here, q, v: slips(here, q, v, i), at, over)
+
+
+def cone_gradient(at: Point, over: Theta, i: int) -> tuple[float, Floats, float]:
+    """By how much contact i, which sticks, is below its bound: value, gradient, and the bound."""
+    _, lam, slope = slopes(at, over)
+    n, places, mu = at.system.n, at.tangents(i), at.system.friction[i]
+    changed = gradient(lambda here, q, v: here.given("friction")[i : i + 1], at, over)[0]
+    size, lam_x = float(np.linalg.norm(lam[places])), slope[n:]
+    rate = lam[places] @ lam_x[places] / size if size > 0.0 else np.zeros(lam_x.shape[1])
+    if at.system.dry[i]:
+        return float(mu) - size, changed - rate, float(mu)
+    j = at.active.tolist().index(i)
+    return float(mu * lam[j]) - size, mu * lam_x[j] + lam[j] * changed - rate, float(mu * lam[j])
 
 
 def lam_gradient(at: Point, over: Theta, i: int) -> Floats:
