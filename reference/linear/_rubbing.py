@@ -17,6 +17,10 @@ HELD = 1e-8  # part of its terms by which the law of a row may be off that other
 JAMMED = 1e-9  # determinant, of rows of size 1, that counts as none
 
 
+class NoDirectionError(SceneError):
+    """A contact slides at no speed, so that its friction has no direction."""
+
+
 def borne(at: Point, H: Array, v: Array, lam: Array) -> Array:
     """Multipliers of all active rows (na, ...) from those of the rows that are solved for."""
     if len(at.solved) == len(at.active):
@@ -116,7 +120,7 @@ def check_slips(at: Point, H: Floats) -> None:
         drift = at.given("drift")[rows]
         slip, size = H[places] @ at.v - drift, np.abs(H[places]) @ np.abs(at.v) + np.abs(drift)
         if not np.linalg.norm(slip) > SLOW * size.max():
-            raise SceneError(
+            raise NoDirectionError(
                 f"linearise: row {i} slides at no speed at q = {at.q.tolist()}, so that its friction has no direction; "
                 "valid: a state in which it slides, or the contact among those that stick."
             )

@@ -18,6 +18,7 @@ from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._point import NO_ROWS, Point, directions, rubbing, turning
+from crossbody.reference.linear._rubbing import NoDirectionError
 from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, Slipping
 from crossbody.reference.linear._slipping import AS_ONE as SWITCH_AS_ONE
 from crossbody.reference.linear._variation import (
@@ -241,8 +242,13 @@ class _Walk:
         n, nq = system.n, system.nq
 
         def rate(t: float, y: Floats) -> Floats:
-            moved = _placed(here, t, y)
-            f, slope = flow(moved, self.over)
+            moved, lost = _placed(here, t, y), np.full(len(y), np.nan)
+            if not np.isfinite(y).all():
+                return lost
+            try:
+                f, slope = flow(moved, self.over)
+            except NoDirectionError:  # a trial step to where a slip is zero, which is too long
+                return lost
             S = y[nq + n :].reshape(shape)
             tangent = S[n:]
             if system.velocity is not None:

