@@ -30,7 +30,7 @@ from numba.core.serialize import dumps
 
 from crossbody.reference import code_store
 from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values
-from crossbody.reference._parts import PartPasses, WholePasses
+from crossbody.reference._parts import PartPasses, WholePasses, read_back
 
 _SETTINGS = (
     "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX", "DEBUGINFO_DEFAULT",
@@ -185,7 +185,7 @@ class _Overloads:
             return None
         rtsys.initialize(target_context)  # all that code which is read back needs of what a compiler sets up
         try:
-            return CompileResult._rebuild(target_context, *pickle.loads(data))
+            return _rebuilt(target_context, *pickle.loads(data))
         except Exception as error:
             # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
             store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
@@ -200,6 +200,23 @@ class _Overloads:
 
     def flush(self) -> None:
         """Forget nothing: what is stale has another key."""
+
+
+def _rebuilt(
+    context: Any, kept: Any, description: Any, environment: Any, signature: Any, objectmode: bool, lifted: Any,
+    annotation: str, reload_init: Any, environments: Any,
+) -> CompileResult:  # fmt: skip
+    """Make callable what `CompileResult._reduce` took apart."""
+    for begin in reload_init:
+        begin()
+    library = read_back(context.codegen(), kept, description)
+    entry = context.get_executable(library, description, environment)
+    for one in environments:
+        library.codegen.set_env(one.env_name, one)
+    return CompileResult(
+        context.typing_context, context, entry, None, annotation, signature, objectmode, lifted, description, library,
+        None, environment, None, reload_init, environments,
+    )  # fmt: skip
 
 
 @cache
