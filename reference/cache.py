@@ -24,6 +24,7 @@ import numba.core.config as numba_config
 from numba.core import sigutils, types, typing
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.environment import Environment, lookup_environment
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
@@ -36,6 +37,9 @@ _SETTINGS = (
     "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX", "DEBUGINFO_DEFAULT",
     "CPU_NAME", "CPU_FEATURES", "FULL_TRACEBACKS", "LLVM_PASS_TIMINGS",
 )  # fmt: skip
+
+FORMAT = "2"
+"""What `save_overload` writes; another number for every change of it."""
 
 
 def debugging() -> bool:
@@ -196,21 +200,43 @@ class _Overloads:
         store = code_store.current() if self.content else None
         if store is None or result.library.has_dynamic_globals or any(not part.can_cache for part in result.lifted):
             return
-        store.write(self.key(self.content, sig), dumps(result._reduce()))
+        library, description, environment, *rest, others = result._reduce()
+        kept = library, description, _told(environment), *rest, [_told(one) for one in others]
+        store.write(self.key(self.content, sig), dumps(kept))
 
     def flush(self) -> None:
         """Forget nothing: what is stale has another key."""
 
 
+def _told(environment: Environment) -> tuple[str, list[Any], str]:
+    """What is kept of the constants of a function: the module that it stands in, themselves, and their name."""
+    return environment.globals["__name__"], list(environment.consts), environment.env_name
+
+
+def _environment(module: str, constants: list[Any], name: str) -> Environment:
+    """Give a function its constants back.
+
+    numba imports its module for that, which compiled code does not ask for: of numba's own linear algebra it takes
+    longer than all else.
+    """
+    found = lookup_environment(name)
+    if found is None:
+        found = Environment({"__name__": module})
+        found.consts[:], found.env_name = constants, name
+        Environment._memo[name] = found
+    return found
+
+
 def _rebuilt(
-    context: Any, kept: Any, description: Any, environment: Any, signature: Any, objectmode: bool, lifted: Any,
-    annotation: str, reload_init: Any, environments: Any,
+    context: Any, kept: Any, description: Any, told: Any, signature: Any, objectmode: bool, lifted: Any,
+    annotation: str, reload_init: Any, others: Any,
 ) -> CompileResult:  # fmt: skip
-    """Make callable what `CompileResult._reduce` took apart."""
+    """Make callable what `save_overload` took apart."""
     for begin in reload_init:
         begin()
-    library = read_back(context.codegen(), kept, description)
+    library, environment = read_back(context.codegen(), kept, description), _environment(*told)
     entry = context.get_executable(library, description, environment)
+    environments = tuple(_environment(*one) for one in others)
     for one in environments:
         library.codegen.set_env(one.env_name, one)
     return CompileResult(
@@ -224,7 +250,7 @@ def machine() -> tuple[str, ...]:
     """Return what compiled code depends on beside its source: versions, processor, settings of numba."""
     target = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
     settings = [f"{name}={getattr(numba_config, name, None)}" for name in _SETTINGS]
-    return (numba.__version__, llvmlite.__version__, platform.python_version(), str(target), *settings)
+    return (FORMAT, numba.__version__, llvmlite.__version__, platform.python_version(), str(target), *settings)
 
 
 class Part(Lean):
