@@ -240,8 +240,8 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) 
 
     Its velocities are put off, on its rows.
     """
-    fastest = float(np.max(np.abs(truth.v), initial=0.0))
-    if not case.general or not truth.outcome.ok or not RESTS < fastest < math.inf:
+    fastest = max(float(np.max(np.abs(truth.v), initial=0.0)), RESTS)  # what balances falls, however slowly
+    if not case.general or not truth.outcome.ok or not fastest < math.inf:
         return np.array([0.0, case.t_end]), np.ones(2)
     from crossbody.engines.equations import system_of
 
