@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from crossbody.cases import Case, Outcome, Tier, Trajectory
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
-from crossbody.reports.judging.reach import BEFORE, LEAST, MANY, SHORT, SHORTEST, cut_short, followed
+from crossbody.reports.judging.reach import BEFORE, LEAST, MANY, SHORT, SHORTEST, cut_short, followed, motion
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word
@@ -50,6 +51,21 @@ def test_errors_grow_as_the_closed_form_of_an_upright_pendulum_has_it(seed: int,
     truth = truth_of(pendulum(length, True, start, t_end))
     assert truth.grows == pytest.approx(np.sinh(k * t_end) / (k * t_end), rel=1e-3)
     assert truth_of(pendulum(length, False, start, t_end)).grows == 1.0
+
+
+def test_a_neighbour_that_gets_less_far_tells_of_growth_up_to_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of an upright pendulum's neighbours that are followed to T/2: sinh(k T/2)/(k T)."""
+
+    def halved(case: Case, rtol: float, **settings: Any) -> Trajectory:
+        if "time_limit" not in settings:
+            return motion(case, rtol, **settings)
+        run = motion(replace(case, t_end=0.5 * case.t_end), rtol, samples=settings["samples"][:101])
+        return replace(run, outcome=Outcome.TIME_LIMIT)
+
+    monkeypatch.setattr("crossbody.reports.judging.truth.motion", halved)
+    k, t_end = np.sqrt(9.81 * 0.5 / (0.5**2 + INERTIA[0])), 2.0
+    grows = truth_of(pendulum(0.5, True, 1e-4, t_end)).grows
+    assert grows == pytest.approx(np.sinh(0.5 * k * t_end) / (k * t_end), rel=1e-3)
 
 
 def double_pendulum(angle: float, t_end: float) -> Case:
