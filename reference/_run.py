@@ -271,6 +271,7 @@ class CompiledRun:
             if self.nz
             else None,
             determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
+            unique_until=float(state["unique_until"]) if state["not_unique"] else np.inf,
         )  # fmt: skip
         if self.callback is not None:
             controller = self.callback.controller

@@ -211,6 +211,7 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
         return None
     reasons = [
         (truth.trajectory.determined_until, "the law does not say how contacts that slide share their load"),
+        (truth.trajectory.unique_until, "more than one set of sticking, sliding and open contacts keeps the law"),
         (_arbitrary(truth, second, case), "the law does not say which of rows that depend on each other lets go first"),
     ]
     if truth.parted < case.t_end and grown[-1] > MULTIPLIED:
@@ -235,9 +236,7 @@ def _arbitrary(truth: Truth, second: Trajectory, case: Case) -> float:
     return math.inf
 
 
-def _growing(
-    case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], limit: float
-) -> tuple[Floats, Floats]:
+def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], limit: float) -> tuple[Floats, Floats]:
     """Instants (n,), s, and by how much more than in free flight errors of a scene's start have grown until then (n,).
 
     Its velocities are put off, on its rows. A neighbour that gets less far, or takes longer than a limit, s, tells of
