@@ -69,7 +69,8 @@ def test_rows_of_many_velocities_are_read_as_those_of_few(tmp_path: Path) -> Non
         path = tmp_path / f"{many}.xml"
         path.write_text(f"""<mujoco><option gravity="0 0 -9.81"/><default><geom contype="0" conaffinity="0"/></default>
           <worldbody><geom name="floor" type="plane" size="1 1 1" contype="1"/>
-          <body pos="0 0 .3"><joint name="a" type="slide" axis="0 0 1" range="-.1 1" limited="true"/><geom size=".1"/></body>
+          <body pos="0 0 .3"><joint name="a" type="slide" axis="0 0 1" range="-.1 1" limited="true"/>
+          <geom size=".1"/></body>
           <body pos="1 0 .3"><joint name="b" type="slide" axis="0 0 1"/><geom size=".1"/></body>
           <body pos="2 0 .3"><joint type="slide" axis="0 0 1"/><geom name="ball" size=".1" conaffinity="1"/></body>
           {beside}</worldbody>
