@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
+from hypothesis import given, settings
 from known_errors import ERRORS, OFF, account, booked, changed, right, scene
 from known_values import VALUES
+from scipy.spatial.transform import Rotation
 
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
+from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.mechanisms.delta import pose
@@ -25,7 +29,7 @@ SEEDS = range(8)
 """Draws of sample, row, component and sign, and of which event."""
 
 
-def measure(name: str, case: Case, truth: Truth, run: Trajectory) -> float:
+def measure(name: str, case: Case, truth: Truth | None, run: Trajectory) -> float:
     value = metrics.of(case)[name].measure(truth, run, case)
     assert value is not None
     return value
@@ -161,6 +165,41 @@ def test_a_factor_on_every_velocity_is_the_residual_of_the_rates(factor: float, 
     run = truth.at(np.linspace(0.0, 0.4, 401))  # the first fall, on which the trapezoidal rule is exact
     run = replace(run, v=factor * run.v)
     assert measure("rate_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-9)
+
+
+def spun(case: Case, rates: Floats, t: Floats) -> Trajectory:
+    """A run in which everything moves at constant rates (nv,), and turns about axes that are fixed in itself."""
+    at, row, parts = 0, 0, []
+    for first in (*case.quaternions, len(case.q0)):
+        parts.append(case.q0[at:first] + t[:, None] * rates[row : (row := row + first - at)])
+        if first < len(case.q0):
+            turn = Rotation.from_quat(case.q0[first : first + 4], scalar_first=True)
+            turned = turn * Rotation.from_rotvec(t[:, None] * rates[row : row + 3])
+            parts.append(turned.as_quat(scalar_first=True))
+            at, row = first + 4, row + 3
+    q, v, none = np.concatenate(parts, axis=1), np.tile(rates, (len(t), 1)), np.zeros((len(t), 0))
+    return Trajectory(t=t, q=q, v=v, lam=none, gap=none, energy=np.zeros((len(t), 2)), mode=none.astype(np.int8))
+
+
+@pytest.mark.parametrize("label", ["rolling_sphere:straight", "stacked_blocks:together", "tossed_cube:tumbles"])
+@settings(max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_rates_of_what_turns_in_space_are_held_against_its_turns(label: str, seed: int) -> None:
+    """Each rate by itself: with a factor on one the way is off by as much, with none or about other axes not at all."""
+    rng, case = np.random.default_rng(seed), load(*label.split(":"))
+    rates = rng.choice([-1.0, 1.0], len(case.v0)) * rng.uniform(1.0, 3.0, len(case.v0))
+    run, factor, k = spun(case, rates, np.linspace(0.0, 2.0, 41)), float(rng.uniform(0.5, 1.5)), rng.integers(len(rates))
+    v = run.v.copy()
+    v[:, k] *= factor
+    assert measure("rate_residual", case, None, run) < 1e-12
+    assert measure("rate_residual", case, None, replace(run, v=v)) == pytest.approx(abs(factor - 1.0), rel=1e-9)
+
+
+def test_turns_that_samples_do_not_tell_are_left_out() -> None:
+    """A sphere that turns by seven between two samples stands as if it turned by seven less than once round."""
+    case = load("rolling_sphere", "straight")
+    run = spun(case, np.array([1.0, 2.0, 0.0, 70.0, 0.0, 0.0]), np.linspace(0.0, 1.0, 11))
+    assert measure("rate_residual", case, None, run) < 1e-12
 
 
 def test_the_flange_is_held_against_its_path_once_it_has_settled() -> None:
