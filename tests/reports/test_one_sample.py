@@ -159,6 +159,21 @@ def test_a_factor_on_every_force_is_the_residual_of_the_law(factor: float, ball:
     assert measure("law_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-6)
 
 
+@pytest.mark.parametrize("k", range(6))
+def test_of_rows_that_strike_at_once_one_may_strike_a_little_later(k: int) -> None:
+    """A sample at that instant does not say on which side of the strike it stands, in the run as in the truth."""
+    case, truth = right("pendulums")
+    run, event = truth.trajectory, [e for e in truth.trajectory.events if e.impulse][k]
+    behind = int(np.searchsorted(run.t, event.t, side="right"))
+    later = event.t + 1e-3 * (run.t[behind] - event.t)
+    rows = np.insert(np.arange(len(run.t)), behind, [behind - 1, behind - 1])
+    t = np.insert(run.t, behind, [later, later])
+    parts = {name: getattr(run, name)[rows] for name in ("q", "v", "gap", "lam", "energy", "mode")}
+    events = sorted((replace(e, t=later) if e is event else e for e in run.events), key=lambda e: e.t)
+    apart = replace(run, t=t, events=tuple(events), ledger=None, **parts)
+    assert measure("lam_impulse_path", case, truth, apart) < 1e-9
+
+
 @pytest.mark.parametrize("factor", [0.9, 1.01, 1.1])
 def test_a_factor_on_every_velocity_is_the_residual_of_the_rates(factor: float, ball: tuple[Case, Truth]) -> None:
     case, truth = ball
@@ -188,7 +203,7 @@ def test_the_rates_of_what_turns_in_space_are_held_against_its_turns(label: str,
     """Each rate by itself: with a factor on one the way is off by as much, with none or about other axes not at all."""
     rng, case = np.random.default_rng(seed), load(*label.split(":"))
     rates = rng.choice([-1.0, 1.0], len(case.v0)) * rng.uniform(1.0, 3.0, len(case.v0))
-    run, factor, k = spun(case, rates, np.linspace(0.0, 2.0, 41)), float(rng.uniform(0.5, 1.5)), rng.integers(len(rates))
+    run, factor, k = spun(case, rates, np.linspace(0.0, 2.0, 41)), rng.uniform(0.5, 1.5), rng.integers(len(rates))
     v = run.v.copy()
     v[:, k] *= factor
     assert measure("rate_residual", case, None, run) < 1e-12
