@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from crossbody import cases
 from crossbody.cases import Outcome
 from crossbody.reference.linear import LinearModel
-from crossbody.reports.analysis import numbers
+from crossbody.reports.analysis import bode, numbers
 
 OMEGA = np.logspace(-1.0, 1.5, 80)
 
@@ -90,3 +91,34 @@ def test_equilibria_have_every_number_by_its_name() -> None:
     wanted = dict(zip(names, q, strict=True)) | {f"{names[i]}'": v[i] for i in (1, 3, 5)}
     wanted |= {"u[0]": u[0], "u[1]": u[1], f"lam {case.contacts[1]}": lam[0], f"lam {case.contacts[3]}": lam[1]}
     assert dict(zip(table["variable"], table["value"], strict=True)) == wanted
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bode_table_is_the_response_of_each_curve(seed: int) -> None:
+    curves = []
+    for k, place in enumerate(drawn(seed)[:2]):
+        A, B, C, D = place.model.matrices
+        model = replace(
+            place.model,
+            A=A - 3.0 * np.eye(len(A)),
+            B=B[:, :1],
+            C=C[:2],
+            D=D[:2, :1],
+            inputs=("in",),
+            outputs=("f", "v"),
+        )
+        curves.append(bode.Curve(mode=("grasp", "free")[k], kstar=float(k), model=model))
+    table, poles = bode.table(curves, OMEGA), bode.poles(curves)
+    assert len(table) == 4 * len(OMEGA)
+    for curve in curves:
+        A, B, C, D = curve.model.matrices
+        for i, output in enumerate(bode.OUTPUTS):
+            own = table[(table["mode"] == curve.mode) & (table["output"] == output)]
+            wanted = np.array([(C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) + D)[i, 0] for w in OMEGA])
+            np.testing.assert_allclose(own["magnitude"] * np.exp(1j * np.radians(own["phase"])), wanted, rtol=1e-9)
+            assert set(own["unit"]) == {bode.UNITS[output]}
+        values = np.linalg.eigvals(A)
+        found = poles[poles["mode"] == curve.mode]
+        assert np.sort_complex(found["real"] + 1j * found["imag"]) == pytest.approx(np.sort_complex(values))
+        row = bode.growths(poles).set_index("mode").loc[curve.mode]
+        assert row["growth"] == pytest.approx(values[np.argsort(np.abs(values))[2:]].real.max())

@@ -1,4 +1,4 @@
-"""What a scene does not need: every row of that table is what its runs took and counted."""
+"""What a scene does not need, and many runs at once: every row is what its runs took and counted."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, Outcome
-from crossbody.reports.bench import skip
+from crossbody.reports.bench import skip, throughput
 
 COUNTS = ("guards", "rhs", "exact_steps", "factorisations", "collisions")
 
@@ -102,3 +102,26 @@ def test_the_shortest_of_several_runs_counts() -> None:
 )
 def test_a_ratio_is_held_on_its_side_of_the_limit(value: float, least: bool, held: bool) -> None:
     assert skip.ratio("", value, 1.0, "", "", least=least)["held"] is held
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rows_of_throughput_are_ratios_of_their_runs(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Medians of ratios, not ratios of medians; of pairs the best beside which two cores were given."""
+    rng, said, cores = np.random.default_rng(seed), [], iter([1.95, 1.92, 1.99, 1.0] * 3)
+
+    def rate(*asked: Any) -> float:
+        said.append((asked, float(rng.uniform(10.0, 90.0))))
+        return said[-1][1]
+
+    monkeypatch.setattr(throughput, "reference", rate)
+    monkeypatch.setattr(throughput, "mujoco", rate)
+    monkeypatch.setattr(throughput.best_pair, "__defaults__", (lambda: next(cores),))
+    table = throughput.measure(3).set_index("what")
+    ratios = [a / b for (_, a), (_, b) in zip(said[0::2], said[1::2], strict=True)]
+    assert table["value"].to_list()[:2] == pytest.approx([np.median(ratios[:3]), np.median(ratios[3:6])])
+    assert [asked[2] for asked, _ in said[1:12:2]] == ["Euler"] * 3 + ["RK4"] * 3
+    two = [1.0 / one for k, one in enumerate(ratios[6:]) if k % 4 != 3]
+    assert table["value"].iloc[2] == pytest.approx(max(two))
+    assert [asked for asked, _ in said[12:14]] == [(throughput.PAIR_RUNS, 1), (throughput.PAIR_RUNS, 2)]
+    limits = [throughput.LEAST_RATIO] * 2 + [throughput.LEAST_TWO]
+    assert table["held"].to_list() == [value >= limit for value, limit in zip(table["value"], limits, strict=True)]
