@@ -159,6 +159,37 @@ def test_a_factor_on_every_force_is_the_residual_of_the_law(factor: float, ball:
     assert measure("law_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-6)
 
 
+LEFT_OUT = {"velocity": "v", "energy_drift": "energy", "contact_work": "contact", "lam_impulse_path": "lam"}
+"""Metrics for which a sample at a strike says nothing, and the signals that they look at."""
+
+
+@pytest.mark.parametrize(
+    ("name", "which"),
+    [(name, which) for name in LEFT_OUT for which in ("sliders", "pendulums", "blow")
+     if (name, which) not in (("contact_work", "pendulums"), ("contact_work", "blow"))],
+)  # fmt: skip
+def test_samples_at_strikes_count_nowhere_and_those_beside_them_do(name: str, which: str) -> None:
+    case, truth = right(which)
+    run, strikes = truth.trajectory, np.array([e.t for e in truth.trajectory.events if e.impulse])
+    far = np.abs(run.t[:, None] - strikes).min(axis=1)
+    before = measure(name, case, truth, run)
+
+    def off(rows: np.ndarray) -> float:
+        by = 0.1 * rows[:, None]
+        if LEFT_OUT[name] == "contact":
+            assert run.ledger is not None
+            wrong = replace(run, ledger=replace(run.ledger, contact=run.ledger.contact + by))
+        else:
+            wrong = replace(run, **{LEFT_OUT[name]: getattr(run, LEFT_OUT[name]) + by})
+        return measure(name, case, truth, wrong)
+
+    beside = np.zeros(len(far), dtype=bool)
+    beside[int(np.argmin(np.where(far > 1e-6 * case.t_end, far, np.inf)))] = True
+    if name != "lam_impulse_path":  # which adds up what acts at the samples beside it
+        assert off(far <= 1e-9 * case.t_end) == before
+    assert off(beside) > before + 1e-6
+
+
 @pytest.mark.parametrize("k", range(6))
 def test_of_rows_that_strike_at_once_one_may_strike_a_little_later(k: int) -> None:
     """A sample at that instant does not say on which side of the strike it stands, in the run as in the truth."""
