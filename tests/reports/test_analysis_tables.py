@@ -7,12 +7,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+from unpacked import numbers as read
 
 from crossbody import cases
 from crossbody.cases import Outcome
 from crossbody.reference.linear import LinearModel
-from crossbody.reports.analysis import bode, numbers
+from crossbody.reports.analysis import bode, figure, numbers
 
 OMEGA = np.logspace(-1.0, 1.5, 80)
 
@@ -122,3 +124,54 @@ def test_a_bode_table_is_the_response_of_each_curve(seed: int) -> None:
         assert np.sort_complex(found["real"] + 1j * found["imag"]) == pytest.approx(np.sort_complex(values))
         row = bode.growths(poles).set_index("mode").loc[curve.mode]
         assert row["growth"] == pytest.approx(values[np.argsort(np.abs(values))[2:]].real.max())
+
+
+def lines_of(drawn_: Any) -> dict[tuple[str, str], Any]:
+    """Lines of a figure by their names and the titles of their y axes."""
+    axes = drawn_["layout"]
+    return {(line["name"], axes[line["yaxis"].replace("y", "yaxis")]["title"]["text"]): line for line in drawn_["data"]}
+
+
+def test_responses_are_drawn_over_their_frequencies_on_the_axes_that_say_so() -> None:
+    table = numbers.responses(drawn(1), OMEGA)
+    lines = lines_of(figure.response_figure(table))
+    assert len(lines) == 2 * 2 * 2 * 3
+    for (place, source, sink), own in table.groupby(["place", "input", "output"]):
+        for value, title in (("magnitude", "magnitude [SI unit of output / of input]"), ("phase", "phase [deg]")):
+            line = lines[f"{place}: {source} to {sink}", title]
+            np.testing.assert_allclose(read(line["x"]), own["omega"])
+            np.testing.assert_allclose(read(line["y"]), own[value], rtol=1e-6)
+
+
+def test_bode_lines_stand_in_the_column_of_their_output_and_under_their_gain() -> None:
+    rng, rows = np.random.default_rng(0), []
+    for kstar in (0.0, 20.0):
+        for output in bode.OUTPUTS:
+            more = {"mode": "grasp", "kstar": kstar, "output": output, "unit": bode.UNITS[output], "omega": OMEGA}
+            rows.append(pd.DataFrame({**more, "magnitude": rng.random(len(OMEGA)), "phase": rng.random(len(OMEGA))}))
+    table = pd.concat(rows)
+    drawn_ = figure.bode_figure(table)
+    for line in drawn_["data"]:
+        title = drawn_["layout"][line["yaxis"].replace("y", "yaxis")]["title"]["text"]
+        column = int(line["yaxis"][1:] or 1) % 2
+        output, value = bode.OUTPUTS[1 - column], title.split(" ")[0]
+        own = table[(table["output"] == output) & (table["kstar"] == float(line["name"].split(" ")[2]))]
+        np.testing.assert_allclose(read(line["y"]), own[value], rtol=1e-6)
+        np.testing.assert_allclose(read(line["x"]), own["omega"])
+        assert value == "phase" or bode.UNITS[output] in title
+    assert len({(line["name"], line["yaxis"]) for line in drawn_["data"]}) == 8
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_poles_and_the_map_are_drawn_where_they_are(seed: int) -> None:
+    table = numbers.poles(drawn(seed))
+    for line in figure.pole_figure(table)["data"]:
+        own = table[table["place"] == line["name"]]
+        np.testing.assert_allclose([read(line["x"]), read(line["y"])], [own["real"], own["imag"]], rtol=1e-6)
+    x, z = np.meshgrid([-0.1, 0.0, 0.2], [0.3, 0.5])
+    growth = np.random.default_rng(seed).normal(size=6)
+    mapped = pd.DataFrame({"x": x.ravel(), "z": z.ravel(), "growth": growth}).sample(frac=1.0, random_state=seed)
+    for layer in figure.map_figure(mapped)["data"]:
+        np.testing.assert_allclose(read(layer["x"]), [-0.1, 0.0, 0.2])
+        np.testing.assert_allclose(read(layer["y"]), [0.3, 0.5])
+        np.testing.assert_allclose(read(layer["z"]).reshape(2, 3), growth.reshape(2, 3), rtol=1e-6)

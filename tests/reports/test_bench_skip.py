@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crossbody import cases, engines
 from crossbody.cases import Case, Outcome
 from crossbody.reports.bench import skip, throughput
 
@@ -125,3 +126,13 @@ def test_rows_of_throughput_are_ratios_of_their_runs(seed: int, monkeypatch: pyt
     assert [asked for asked, _ in said[12:14]] == [(throughput.PAIR_RUNS, 1), (throughput.PAIR_RUNS, 2)]
     limits = [throughput.LEAST_RATIO] * 2 + [throughput.LEAST_TWO]
     assert table["held"].to_list() == [value >= limit for value, limit in zip(table["value"], limits, strict=True)]
+
+
+def test_what_is_timed_is_the_motion_of_the_case() -> None:
+    """With its inputs, and the collisions that it asks for."""
+    for case in (cases.load("delta_impulse", "light", t_end=0.2), cases.load("newtons_cradle", "sliders", gap=1e-3)):
+        run = skip._run(case)
+        found = run.trajectory(*run.go())
+        wanted = engines.load("reference").prepare(case, "compiled", rtol=1e-8).run()
+        np.testing.assert_allclose(found.q[-1], wanted.q[-1], atol=1e-6)
+        assert len(found.events) == len(wanted.events)
