@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import bz2
+import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import hypothesis.strategies as st
 import pytest
@@ -11,6 +13,7 @@ from hypothesis import given
 
 from crossbody.cases import LogFormatError
 from crossbody.hw import budget as budgets
+from crossbody.hw import formats
 from crossbody.hw.budget import Budget
 from crossbody.hw.formats._bounded import UNFOLD, Chunks
 
@@ -64,3 +67,41 @@ def test_a_file_has_the_more_time_the_larger_it_is(size: int, memory: int) -> No
     beyond = (size - 5_000_000) / 250e3 if size > 5_000_000 else 0.0
     assert found.seconds == pytest.approx((7.0 + beyond) * (memory / 2**30 if memory > 2**30 else 1.0))
     assert (found.memory, found.most) == (memory + size, memory // 4 + 100 * size)
+
+
+def test_topics_that_are_not_read_say_why(tmp_path: Path) -> None:
+    """Of a file with five of them one is read; no other vanishes."""
+    writing = pytest.importorskip("mcap.writer")
+    path, told = tmp_path / "rig.mcap", {"/deep": [{"q": 1.0}] * 20_000, "/long": "x" * 1_100_000, "/rig": 1.0}
+    with path.open("wb") as file:
+        writer = writing.Writer(file)
+        writer.start()
+        schema = writer.register_schema("state", "jsonschema", b'{"type": "object"}')
+        for topic, value in told.items():
+            channel = writer.register_channel(topic, "json", schema)
+            writer.add_message(channel, log_time=0, publish_time=0, data=json.dumps({"a": 1.0, "b": value}).encode())
+        writer.add_message(writer.register_channel("/other", "cbor", schema), log_time=0, publish_time=0, data=b"1")
+        writer.finish()
+    log = formats.open_log(path, "mcap")
+    assert [group.name for group in log.groups] == ["/rig"]
+    words = {"/deep": "messages inside", "/long": "messages of", "/other": "is encoded as cbor"}
+    assert log.refused.keys() == words.keys()
+    assert all(words[topic] in why for topic, why in log.refused.items())
+    log.close()
+
+
+@given(st.lists(st.integers(0, 500), max_size=4), st.integers(0, 200), st.integers(0, 24))
+def test_rows_that_no_block_of_an_mdf_file_holds_are_told(sizes: list[int], rows: int, width: int) -> None:
+    mdf = pytest.importorskip("crossbody.hw.formats.mdf")
+    path = Path("rig.mf4")
+    reader = SimpleNamespace(_budget=Budget(path), _path=path)
+    group = SimpleNamespace(
+        get_data_blocks=lambda: [SimpleNamespace(original_size=size) for size in sizes], channels=[None],
+        channel_group=SimpleNamespace(samples_byte_nr=width),
+    )  # fmt: skip
+    if rows * width <= sum(sizes):
+        mdf.MdfReader._check_size(reader, group, rows, 3)
+        return
+    with pytest.raises(LogFormatError, match=f"announces {rows} rows in group 3 and holds") as told:
+        mdf.MdfReader._check_size(reader, group, rows, 3)
+    assert told.value.row == max(k for k in range(rows) if k * width <= sum(sizes))

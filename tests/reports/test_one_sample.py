@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import hypothesis.strategies as st
 import numpy as np
@@ -13,7 +14,7 @@ from known_values import VALUES
 from scipy.spatial.transform import Rotation
 
 from crossbody import cases
-from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
+from crossbody.cases import Case, Event, Inputs, Mode, Switch, Tier, Trajectory, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.cases.defaults import limits_of
@@ -23,6 +24,7 @@ from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.truth import Truth, from_run
+from crossbody.reports.metrics import event_gap
 from crossbody.reports.sweep.measure import residual
 
 SEEDS = range(8)
@@ -157,6 +159,30 @@ def test_a_factor_on_every_force_is_the_residual_of_the_law(factor: float, ball:
     case, truth = ball
     run = replace(truth.trajectory, lam=factor * truth.trajectory.lam)
     assert measure("law_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_an_instant_is_alone_where_nothing_else_happens(seed: int) -> None:
+    """Events, switches, changes of the case's and of the run's inputs, and ticks, on instants that they share."""
+    rng, case = np.random.default_rng(seed), load("bouncing_ball", "linear")
+    grid = 0.01 * np.arange(1, 60)
+    events, switches, given, own = (np.sort(rng.choice(grid, n)) for n in (12, 6, 6, 6))
+    tick = float(rng.choice([0.0, 0.05]))
+    run = replace(
+        right("ball")[1].trajectory,
+        events=tuple(Event(t=float(t), contact=0, before=Mode.CONTACT, after=Mode.FREE) for t in events),
+        switches=tuple(Switch(t=float(t), variable=0, before=0, after=1) for t in switches),
+        inputs=Inputs(names=("u",), times=np.unique(own), values=np.zeros((len(np.unique(own)), 1))),
+    )
+    told = replace(
+        case, inputs=Inputs(names=("u",), times=np.unique(given), values=np.zeros((len(np.unique(given)), 1)))
+    )
+    system = SimpleNamespace(tick=tick, control=True)
+    alone = event_gap._alone(run, told, system)  # type: ignore[arg-type]
+    for t in events:
+        others = np.concatenate([switches, given, own, np.arange(0.0, 1.0, tick) if tick else []])
+        wanted = np.sum(np.abs(events - t) < 1e-9) == 1 and not (np.abs(others - t) < 1e-9).any()
+        assert alone(float(t)) == wanted
 
 
 LEFT_OUT = {"velocity": "v", "energy_drift": "energy", "contact_work": "contact", "lam_impulse_path": "lam"}
