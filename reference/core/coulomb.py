@@ -41,7 +41,6 @@ from crossbody.reference.kinds import Array, Bytes, Floats, Index
 CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip counts from none
 RANK = 1e-10  # part of a contact's own size below which a pivot is that of a row which depends on others
 LIGHT = 1e-12  # part of the largest load at a contact, below which it counts as that
-OPEN = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
 SHARINGS = 3  # times that loads are shared anew: the normal ones follow from the tangential ones
 MOST_SPREADS = 200  # times more where a contact would bear more than it can: others may for it
 JAMMED = 1e-9  # determinant, of rows of size 1, that counts as none
@@ -51,7 +50,7 @@ LINGERS = 10.0  # times as long as friction takes to stop what has no direction:
 @compiled
 def begin(w: Work) -> None:
     """Forget what another run of the same workspace has left."""
-    for left in (w.way, w.rest, w.tolerated):
+    for left in (w.way, w.rest, w.tolerated, w.open_v, w.open_rate):
         left[:] = 0.0
     w.off[:], w.begins[:], w.since[:], w.within[:] = 0, 0, -np.inf, np.inf
 
@@ -136,45 +135,7 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
                 w.hit[i], w.kind[i], linger = 0.0, STOP, True
     if s.na > 0 and s.dependent_rows > 0:
         s.redundant = max(s.redundant, s.dependent_rows)
-        if not s.indeterminate and undetermined(s, m, w):
-            s.indeterminate, s.determined_until = 1, s.t
     return linger
-
-
-@compiled
-def undetermined(s: Any, m: Model, w: Work) -> bool:
-    """Whether multipliers of the rows last factored that change no row change the motion: then the law leaves it open.
-
-    Those of contacts that stick together never do; of a box that slides and spins on four corners they do.
-    """
-    total = s.unknowns
-    _fill(s, m, w)
-    rank = factor_complete(w.matrix, total, total, w.down, w.across)
-    for k in range(rank, total):
-        for a in range(rank - 1, -1, -1):  # A z = 0
-            value = -w.matrix[a, k]
-            for c in range(a + 1, rank):
-                value -= w.matrix[a, c] * w.beside[c]
-            w.beside[a] = value / w.matrix[a, a]
-        for j in range(s.na):
-            w.trial[j] = 0.0
-        for a in range(rank + 1):
-            z = w.beside[a] if a < rank else 1.0
-            b = w.across[a if a < rank else k]
-            j = w.unknown[b]
-            i = w.idx[j]
-            w.trial[j] = z / w.size[b]
-            if has_friction(m, i) and w.slides[i]:
-                for c in range(w.listed[m.tangent[i]], w.listed[m.tangent[i]] + m.tangents[i]):
-                    w.trial[c] = -m.friction[i] * w.trial[j] * w.along[c]
-        moved, size = 0.0, 0.0
-        for j in range(s.na):
-            size += w.trial[j] * w.trial[j] * w.gram[j, j]
-            for c in range(s.na):
-                moved += w.trial[j] * w.gram[j, c] * w.trial[c]
-        if moved > OPEN * size:
-            return True
-    return False
 
 
 @compiled
@@ -235,7 +196,7 @@ def _size(m: Model, w: Work, j: int) -> float:
 
 
 @compiled
-def _fill(s: Any, m: Model, w: Work) -> None:
+def fill(s: Any, m: Model, w: Work) -> None:
     """A of the unknowns in w.matrix, scaled by their sizes, which stand in w.size."""
     for a in range(s.unknowns):
         w.size[a] = _size(m, w, w.unknown[a])
@@ -388,7 +349,7 @@ def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
 def factor_set(s: Any, m: Model, w: Work) -> None:
     """Factor A of the rows that are not off, from w.gram, w.slides and w.along."""
     s.normals = _list_unknowns(s, m, w)
-    _fill(s, m, w)
+    fill(s, m, w)
     s.rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across)
     s.dependent_rows = s.unknowns - s.rank
     if s.dependent_rows > 0:
@@ -399,7 +360,7 @@ def factor_set(s: Any, m: Model, w: Work) -> None:
 def _factor_in_turn(s: Any, m: Model, w: Work) -> None:
     """Factor the normal rows alone, and what they leave of the sticking ones."""
     count, total = s.normals, s.unknowns
-    _fill(s, m, w)
+    fill(s, m, w)
     for a in range(count):
         for b in range(count):
             w.first[a, b] = w.matrix[a, b]
@@ -645,7 +606,7 @@ def determinant(s: Any, m: Model, w: Work, j: int) -> float:
         for a in range(s.unknowns):
             w.seen[a] = not w.reached[w.unknown[w.down[a]]]
         return _signed_product(w.matrix, s.unknowns, w.down, w.across, w.seen) - JAMMED
-    _fill(s, m, w)
+    fill(s, m, w)
     count = 0
     for a in range(s.unknowns):
         if w.reached[w.unknown[a]]:
