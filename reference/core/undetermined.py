@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.coulomb import factor_complete, fill, respond
+from crossbody.reference.core.complete import factor_complete
+from crossbody.reference.core.coulomb import respond
 from crossbody.reference.core.friction import has_friction, is_dry, is_tangent, most_drift
 from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.core.unknowns import fill
 
 MOVES = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
 MOST = 1e3  # times the largest load: what contacts that press on each other may carry has no bound of its own
