@@ -11,6 +11,7 @@ from crossbody import cases
 from crossbody.cases import CaseUnsupported, InvalidValue, Outcome, SceneError, UnknownName
 from crossbody.cases.mechanisms.maze import closed_forms as maze_forms
 from crossbody.reference import delta, simulate
+from crossbody.reference.delta.scene import robot_of
 from crossbody.reference.linear import (
     LinearModel,
     controllable,
@@ -23,6 +24,7 @@ from crossbody.reference.linear import (
     trim,
 )
 from crossbody.reference.sundials.equations import Equations
+from crossbody.reports.analysis import numbers
 from crossbody.reports.analysis import places as analyse
 from crossbody.reports.analysis.loci import Family, limits
 
@@ -130,6 +132,24 @@ def test_the_map_of_the_workspace_is_the_single_model_at_every_pose():
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(a).max())
     assert (found.growth > 0.0).any()
     assert (found.growth < 0.0).any()
+
+
+def test_the_map_counts_the_poles_of_the_single_model_at_every_place() -> None:
+    case = cases.load("delta_free")
+    table = numbers.workspace(case, points=9)
+    robot = robot_of(case.parameters)
+    system = delta.system(robot, p=case.number("p"))
+    assert [np.ptp(table[axis]) for axis in "xz"] == pytest.approx([0.6, 0.45])
+    assert len(table[["x", "z"]].drop_duplicates()) == 81
+    reached = table[table["growth"].notna()]
+    assert not table[table["growth"].isna()]["unstable"].any()
+    assert reached["unstable"].gt(0).equals(reached["growth"] > 0.0)
+    assert reached["unstable"].nunique() > 1
+    for place in reached.iloc[:: len(reached) // 6].itertuples():
+        q = delta.inverse(robot, (place.x, 0.0, place.z))
+        found = linearise(system, q, u=poses(system, q[None], [0, 1, 2]).u[0], reduce=True).poles()
+        assert place.growth == pytest.approx(found.real.max(), rel=1e-9, abs=1e-6)
+        assert place.unstable == np.sum(found.real > 1e-6)
 
 
 def test_poses_out_of_reach_and_singular_ones_are_told():

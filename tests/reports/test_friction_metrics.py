@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import G, box_on_floor, sphere_on_floor
+from friction_scenes import G, box_on_floor, sphere_on_floor, stack
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
 from crossbody.reports import metrics
+from crossbody.reports.measuring.friction import rubbing
 from crossbody.reports.measuring.truth import Truth, from_run
 
 NAMES = (
@@ -128,3 +131,33 @@ def test_spheres_and_turned_planes_are_measured_alike() -> None:
         values = [measured(name, run, case, from_run(run, Tier.A, "itself")) or 0.0 for name in NAMES]
         found.append(np.abs(values))
     assert max(map(np.max, found)) < 1e-9
+
+
+def test_places_of_one_pair_are_one_beside_pairs_without_friction() -> None:
+    """A box that slides on a floor without friction and carries one that rubs: eight corners, one pair."""
+    case = case_of(stack(0.0, 0.4), q0=[0, 0, 0.1, 1, 0, 0, 0, 0, 0, 0.3, 1, 0, 0, 0], t_end=0.1)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    found = rubbing(run, case)
+    assert found is not None
+    assert len(found.pair) == len(found.rows) > 1
+    assert len(set(found.pair.tolist())) == 1
+
+
+def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_path: Path) -> None:
+    """Both ends of a foot stick, which no forces keep in place at once; with mu = 1.9 one lets go that would jam."""
+    found = find_spec("gymnasium")
+    if found is None or found.origin is None:
+        pytest.skip("gymnasium is not installed")
+    path = Path(found.origin).parent / "envs" / "mujoco" / "assets" / "walker2d_v5.xml"
+    times = 0.008 * np.arange(40)
+    table = np.column_stack([times, np.random.default_rng(0).uniform(-1.0, 1.0, (125, 6))[:40]])
+    names = ",".join(["t", *(actuator.name for actuator in cases.load(str(path)).scene.actuators)])
+    np.savetxt(tmp_path / "u.csv", table, delimiter=",", header=names, comments="", fmt="%.17g")
+    case = cases.load(str(path), ctrl=str(tmp_path / "u.csv"), t_end=0.3, friction=1)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    assert any(e.before == Mode.STICK and e.after == Mode.BALLISTIC for e in run.events)
+    truth = from_run(run, Tier.D, "itself")
+    for name in ("event_gap", "law_residual", "cone_violation"):
+        value = measured(name, run, case, truth)
+        assert value is not None
+        assert value < 1e-9
