@@ -148,7 +148,8 @@ STATE = np.dtype(
         ("open_slip", "f8"),  # the fastest slip at its start,
         ("open_gain", "f8"),  # how fast a share changes any,
         ("open_lever", "f8"),  # and what of a slip that is beside the coordinates' velocities
-        ("not_unique", "i8"),  # instants at which more than one set of modes was consistent
+        ("not_unique", "i8"),  # instants at which more than one set of modes was consistent,
+        ("unique_until", "f8"),  # s: and the first of them
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("jam", "i8"),  # contacts have just come to where they jam together
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding

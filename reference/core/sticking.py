@@ -24,7 +24,7 @@ from crossbody.reference.core.mode_set import (
 )
 from crossbody.reference.core.slips import note_speed
 
-FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
+FEW = 64  # sets, which are all tried to see whether others are consistent as well
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 
@@ -42,13 +42,35 @@ def begin_slip(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def _count_others(s: Any, m: Model, w: Work) -> None:
-    """Note whether another set is consistent as well and leads to another motion, where there are few to try."""
-    contacts, standing = 0, 0
+def _choices(m: Model, w: Work, i: int) -> int:
+    """How many modes a contact may have: what slides goes on as it does, or presses no more."""
+    return 4 if w.stands[i] else 2
+
+
+@compiled
+def _number(s: Any, m: Model, w: Work, place: int) -> int:
+    """The number of `_vary` for a place among all combinations of `_choices`."""
+    number, unit = 0, 1
     for j in range(s.na):
-        contacts += has_friction(m, w.idx[j])
-        standing += has_friction(m, w.idx[j]) and w.stands[w.idx[j]]
-    if contacts > FEW or standing == 0:
+        i = w.idx[j]
+        if has_friction(m, i):
+            digit, place = place % _choices(m, w, i), place // _choices(m, w, i)
+            number += unit * (digit if w.stands[i] else 2 * digit)
+            unit *= 4
+    return number
+
+
+@compiled
+def _count_others(s: Any, m: Model, w: Work) -> None:
+    """Note whether another set is consistent as well and leads to another motion, where there are few to try.
+
+    Contacts that all slide may be such: friction makes what they do to each other no P-matrix, though it is symmetric.
+    """
+    sets = 1
+    for j in range(s.na):
+        if has_friction(m, w.idx[j]) and sets <= FEW:
+            sets *= _choices(m, w, w.idx[j])
+    if sets > FEW:
         return
     keep(s, w)
     evaluate_set(s, m, w)
@@ -60,13 +82,15 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
     for i in range(s.nc):
         w.kept_other[i] = w.way[i]
     found = False
-    for number in range(1, 4**contacts):
+    for place in range(1, sets):
         for i in range(s.nc):
             w.way[i] = w.kept_other[i]
-        vary(s, m, w, number)
+        vary(s, m, w, _number(s, m, w, place))
         if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
             for j in range(s.na):
                 found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
+    if found and s.not_unique == 0:
+        s.unique_until = s.t
     s.not_unique += found
     put_back(s, m, w)
 
