@@ -53,6 +53,21 @@ def rates(q: Floats, v: Floats, quaternions: Sequence[int]) -> Floats:
     return np.concatenate([*parts, v[:, row:]], axis=1)
 
 
+def ways(q: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return what positions move by from each to the next (n - 1, nv); a quaternion by a rotation vector in body axes.
+
+    Args:
+        q: positions (n, nq).
+        quaternions: first index in q of each.
+    """
+    moved, parts, at = np.diff(q, axis=0), [], 0
+    for first in quaternions:
+        turn = q[:, first : first + 4]
+        parts += [moved[:, at:first], turned(turn[1:], turn[:-1])]
+        at = first + 4
+    return np.concatenate([*parts, moved[:, at:]], axis=1)
+
+
 def differences(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
     """Return |q - other| (n, nq); in the first entry of a quaternion the angle between both, rad, and 0 in the others.
 

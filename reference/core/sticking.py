@@ -49,7 +49,7 @@ def _choices(m: Model, w: Work, i: int) -> int:
 
 @compiled
 def _number(s: Any, m: Model, w: Work, place: int) -> int:
-    """The number of `_vary` for a place among all combinations of `_choices`."""
+    """The number of `vary` for a place among all combinations of `_choices`."""
     number, unit = 0, 1
     for j in range(s.na):
         i = w.idx[j]

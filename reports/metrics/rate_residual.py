@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases.rotations import ways
 from crossbody.reports.measuring.scale import least, of_like
 
 if TYPE_CHECKING:
@@ -19,20 +20,28 @@ UNIT = "1"
 CLAIMED = False
 STILL = 1e-6
 """A coordinate whose way is below this part of the longest of its like rests."""
+TURN = 0.5
+"""Angle between samples, rad, beyond which they tell no turn: the rule is off by TURN^2/12 of an axis that goes round
+with it, and by whole turns soon."""
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max over coordinates of |sum of (dq - v dt) sign(v)| / sum of |dq|, v dt by the trapezoidal rule between samples.
 
-    Errors of the rule alternate where the motion bends to and fro; a factor on v does not. None where nothing moves,
-    and for coordinates whose rates are not v.
+    Errors of the rule alternate where the motion bends to and fro; a factor on v does not. What turns in space moves
+    about its own axes, as its velocity counts; between samples that are too far apart nothing is told of it. None where
+    nothing moves.
     """
-    if run.q.shape[1] != run.v.shape[1] or len(run.t) < 2:
+    if len(run.t) < 2:
         return None
     mean = 0.5 * (run.v[1:] + run.v[:-1])
-    moved = np.diff(run.q, axis=0)
+    moved, rated = ways(run.q, case.quaternions), mean * np.diff(run.t)[:, None]
+    for i, at in enumerate(case.quaternions):  # i of them before it have an entry more than rates
+        turn = slice(at - i, at - i + 3)
+        far = np.linalg.norm(rated[:, turn], axis=1) > TURN
+        moved[far, turn] = rated[far, turn] = 0.0
     way = np.sum(np.abs(moved), axis=0)
-    off = np.abs(np.sum((moved - mean * np.diff(run.t)[:, None]) * np.sign(mean), axis=0))
-    longest = of_like(way, case.coordinates)
-    moving = (way > STILL * longest) & (longest > least(case.coordinates))
+    off = np.abs(np.sum((moved - rated) * np.sign(mean), axis=0))
+    longest = of_like(way, case.velocities)
+    moving = (way > STILL * longest) & (longest > least(case.velocities))
     return float(np.max(off[moving] / way[moving])) if moving.any() else None

@@ -173,17 +173,17 @@ def lasting(run: Trajectory) -> Trajectory:
 
     Collisions in no time are another thing: they stay.
     """
-    kept: list[Event] = []
+    kept: list[Event | None] = []
+    latest: dict[int, int] = {}
     for event in run.events:
-        last = kept[-1] if kept else None
-        same = last is not None and (last.t, last.contact, last.after) == (event.t, event.contact, event.before)
-        if last is None or not same or event.before != Mode.CONTACT:
-            kept.append(event)
+        k = latest.get(event.contact, -1)
+        last = kept[k] if k >= 0 else None
+        if last is not None and event.before == Mode.CONTACT and (last.t, last.after) == (event.t, event.before):
+            kept[k] = replace(last, after=event.after) if last.before != event.after else None
             continue
-        kept.pop()
-        if last.before != event.after:
-            kept.append(replace(last, after=event.after))
-    return replace(run, events=tuple(kept))
+        latest[event.contact] = len(kept)
+        kept.append(event)
+    return replace(run, events=tuple(event for event in kept if event is not None))
 
 
 def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:

@@ -196,18 +196,20 @@ def test_the_least_push_leaves_no_row_behind_its_law(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_the_row_bears_whose_law_asks_for_most(seed: int) -> None:
-    """A mass below several surfaces, thrown up too slowly: as it turns all could be caught, and one must be."""
+    """A mass below several surfaces, thrown up too slowly: as it turns all could be caught, and one must be.
+
+    It is fast enough for every damping to ask for a pull, so that all rows let it go at the start.
+    """
     rng = np.random.default_rng(seed)
     n, g = int(rng.integers(2, 5)), 9.81
-    H, a0, a1 = rng.uniform(0.3, 1.0, (n, 1)), 10 ** rng.uniform(2.0, 3.0, n), rng.uniform(40.0, 80.0, n)
+    H, a0, a1 = rng.uniform(0.3, 1.0, (n, 1)), 10 ** rng.uniform(2.0, 3.0, n), rng.uniform(200.0, 400.0, n)
     if seed % 2:
         H, a0, a1 = np.ones((n, 1)) + 1e-15 * rng.normal(size=(n, 1)), np.full(n, a0[0]), np.full(n, a1[0])
     start = -rng.uniform(0.05, 0.08, n)
     speed = 1.2 * float((g / H[:, 0] + a0 * -start / H[:, 0]).max() / a1.min())
-    speed = min(speed, 0.9 * float(np.sqrt(2.0 * g * (-start / H[:, 0]).min())))
+    assert speed < 0.9 * float(np.sqrt(2.0 * g * (-start / H[:, 0]).min())), "it turns below all of them"
     found = flow(LevelMachine(rows([1.0], H, start, law(a0, a1), [-g])), [0.0], [speed], 3.0 * speed / g)
     asks = a0 * -(start + H[:, 0] * speed**2 / (2.0 * g)) / H[:, 0]
-    k = next((k for k, mode in enumerate(found.log.mode) if all(m == Mode.BALLISTIC for m in mode)), None)
-    if k is not None and all(m == Mode.BALLISTIC for m in found.log.mode[0]):
-        after = next(mode for mode in found.log.mode[k:] if any(m == Mode.CONTACT for m in mode))
-        assert [i for i in range(n) if after[i] == Mode.CONTACT] == [int(np.argmax(asks))]
+    assert all(m == Mode.BALLISTIC for m in found.log.mode[0])
+    after = next(mode for mode in found.log.mode if any(m == Mode.CONTACT for m in mode))
+    assert [i for i in range(n) if after[i] == Mode.CONTACT] == [int(np.argmax(asks))]

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import hypothesis.strategies as st
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given, settings
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Mode, Outcome, OutputError, Tier, Trajectory
@@ -20,7 +22,7 @@ from crossbody.reports.bench.errors import errors, hermite
 from crossbody.reports.bench.headline import REFERENCE, headline
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.measure import COLUMNS, bench, joined
-from crossbody.reports.bench.order import says
+from crossbody.reports.bench.order import orders, says
 from crossbody.reports.bench.scenes import DROP, QUICK
 from crossbody.reports.bench.throughput import best_pair
 from crossbody.reports.cli import main
@@ -129,6 +131,30 @@ def test_orders_are_held_against_promises(rows: pd.DataFrame) -> None:
     assert orders.loc["liar", "says"] == "converges, but not with the promised order 4"
     assert orders.loc["fails", "says"] == "too few points above rounding"
     assert orders.loc["compiled", "says"] == "exact at every setting"
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(
+        st.tuples(st.floats(0.6, 6.0), st.floats(-2.0, 1.0), st.integers(3, 8), st.integers(0, 5)),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_a_floor_takes_nothing_from_an_order(drawn: list[tuple[float, float, int, int]]) -> None:
+    """Errors of c h^p that stay at a floor behind so many points: the order is p, of every engine beside the others."""
+    ladders = []
+    for k, (p, c, above, below) in enumerate(drawn):
+        h = 0.5 ** np.arange(above + below)
+        exact = 10.0**c * h**p
+        error = np.maximum(exact, 0.09 * exact[above - 1] if below else 0.0)
+        named = {"case": "ball", "engine": f"e{k}", "profile": f"p{k % 2}", "knob": "dt", "promised": p + 0.4}
+        ladders.append(pd.DataFrame({**named, "setting": h, "error": error}))
+    together = pd.concat(ladders).sort_values("setting", kind="stable")
+    found = orders(together).set_index("engine")
+    for k, (p, *_) in enumerate(drawn):
+        assert found.loc[f"e{k}", "order"] == pytest.approx(p, rel=1e-9)
+        assert found.loc[f"e{k}", ["profile", "promised", "says"]].to_list() == [f"p{k % 2}", p + 0.4, "converges"]
 
 
 def test_every_engine_declares_what_it_promises() -> None:

@@ -121,6 +121,28 @@ def test_collisions_that_take_energy_in_no_time_are_not_outside() -> None:
 
 @pytest.mark.parametrize("who", ENGINES)
 @pytest.mark.parametrize("scene", SCENES, ids=":".join)
+def test_what_happens_behind_the_trusted_time_is_not_judged(
+    recorded: Recorded, scene: tuple[str, str], who: str
+) -> None:
+    """All that is recorded there is spoilt, and its events are gone: every number is as it was."""
+    case, truth, entries = recorded[scene]
+    truth, entry = replace(truth, trusted=0.47 * case.t_end, parted=0.47 * case.t_end), entries[who]
+    assert entry.run is not None
+    late = (entry.run.t > 0.5 * case.t_end)[:, None]
+    spoilt = {name: np.where(late, 3.0 * getattr(entry.run, name) + 1.0, getattr(entry.run, name))
+              for name in ("q", "v", "gap", "lam", "energy")}  # fmt: skip
+    ledger = entry.run.ledger
+    if ledger is not None:
+        ledger = replace(ledger, contact=np.where(late, 3.0 * ledger.contact + 1.0, ledger.contact))
+    events = tuple(event for event in entry.run.events if event.t <= 0.5 * case.t_end)
+    wrong = replace(entry, run=replace(entry.run, ledger=ledger, events=events, **spoilt))
+    right, found = ([(row.metric, str(row.value), row.verdict) for row in judged(case, [one], truth, "")]
+                    for one in (entry, wrong))  # fmt: skip
+    assert found == right
+
+
+@pytest.mark.parametrize("who", ENGINES)
+@pytest.mark.parametrize("scene", SCENES, ids=":".join)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_is_outside_in_every_engine(recorded: Recorded, fault: str, scene: tuple[str, str], who: str) -> None:
     case, truth, entries = recorded[scene]

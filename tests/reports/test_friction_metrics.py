@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import G, box_on_floor, sphere_on_floor
+from friction_scenes import G, box_on_floor, sphere_on_floor, stack
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
 from crossbody.reports import metrics
+from crossbody.reports.measuring.friction import rubbing
 from crossbody.reports.measuring.truth import Truth, from_run
 
 NAMES = (
@@ -130,6 +131,16 @@ def test_spheres_and_turned_planes_are_measured_alike() -> None:
         values = [measured(name, run, case, from_run(run, Tier.A, "itself")) or 0.0 for name in NAMES]
         found.append(np.abs(values))
     assert max(map(np.max, found)) < 1e-9
+
+
+def test_places_of_one_pair_are_one_beside_pairs_without_friction() -> None:
+    """A box that slides on a floor without friction and carries one that rubs: eight corners, one pair."""
+    case = case_of(stack(0.0, 0.4), q0=[0, 0, 0.1, 1, 0, 0, 0, 0, 0, 0.3, 1, 0, 0, 0], t_end=0.1)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    found = rubbing(run, case)
+    assert found is not None
+    assert len(found.pair) == len(found.rows) > 1
+    assert len(set(found.pair.tolist())) == 1
 
 
 def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_path: Path) -> None:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
+from hypothesis import given, settings
 from known_errors import ERRORS, OFF, account, booked, changed, right, scene
 from known_values import VALUES
+from scipy.spatial.transform import Rotation
 
 from crossbody import cases
-from crossbody.cases import Case, Event, Mode, Switch, Tier, Trajectory, load
+from crossbody.cases import Case, Event, Inputs, Mode, Switch, Tier, Trajectory, load
+from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.mechanisms.delta import pose
@@ -19,13 +24,14 @@ from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.truth import Truth, from_run
+from crossbody.reports.metrics import event_gap
 from crossbody.reports.sweep.measure import residual
 
 SEEDS = range(8)
 """Draws of sample, row, component and sign, and of which event."""
 
 
-def measure(name: str, case: Case, truth: Truth, run: Trajectory) -> float:
+def measure(name: str, case: Case, truth: Truth | None, run: Trajectory) -> float:
     value = metrics.of(case)[name].measure(truth, run, case)
     assert value is not None
     return value
@@ -155,12 +161,117 @@ def test_a_factor_on_every_force_is_the_residual_of_the_law(factor: float, ball:
     assert measure("law_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_an_instant_is_alone_where_nothing_else_happens(seed: int) -> None:
+    """Events, switches, changes of the case's and of the run's inputs, and ticks, on instants that they share."""
+    rng, case = np.random.default_rng(seed), load("bouncing_ball", "linear")
+    grid = 0.01 * np.arange(1, 60)
+    events, switches, given, own = (np.sort(rng.choice(grid, n)) for n in (12, 6, 6, 6))
+    tick = float(rng.choice([0.0, 0.05]))
+    run = replace(
+        right("ball")[1].trajectory,
+        events=tuple(Event(t=float(t), contact=0, before=Mode.CONTACT, after=Mode.FREE) for t in events),
+        switches=tuple(Switch(t=float(t), variable=0, before=0, after=1) for t in switches),
+        inputs=Inputs(names=("u",), times=np.unique(own), values=np.zeros((len(np.unique(own)), 1))),
+    )
+    told = replace(
+        case, inputs=Inputs(names=("u",), times=np.unique(given), values=np.zeros((len(np.unique(given)), 1)))
+    )
+    system = SimpleNamespace(tick=tick, control=True)
+    alone = event_gap._alone(run, told, system)  # type: ignore[arg-type]
+    for t in events:
+        others = np.concatenate([switches, given, own, np.arange(0.0, 1.0, tick) if tick else []])
+        wanted = np.sum(np.abs(events - t) < 1e-9) == 1 and not (np.abs(others - t) < 1e-9).any()
+        assert alone(float(t)) == wanted
+
+
+LEFT_OUT = {"velocity": "v", "energy_drift": "energy", "contact_work": "contact", "lam_impulse_path": "lam"}
+"""Metrics for which a sample at a strike says nothing, and the signals that they look at."""
+
+
+@pytest.mark.parametrize(
+    ("name", "which"),
+    [(name, which) for name in LEFT_OUT for which in ("sliders", "pendulums", "blow")
+     if (name, which) not in (("contact_work", "pendulums"), ("contact_work", "blow"))],
+)  # fmt: skip
+def test_samples_at_strikes_count_nowhere_and_those_beside_them_do(name: str, which: str) -> None:
+    case, truth = right(which)
+    run, strikes = truth.trajectory, np.array([e.t for e in truth.trajectory.events if e.impulse])
+    far = np.abs(run.t[:, None] - strikes).min(axis=1)
+    before = measure(name, case, truth, run)
+
+    def off(rows: np.ndarray) -> float:
+        by = 0.1 * rows[:, None]
+        if LEFT_OUT[name] == "contact":
+            assert run.ledger is not None
+            wrong = replace(run, ledger=replace(run.ledger, contact=run.ledger.contact + by))
+        else:
+            wrong = replace(run, **{LEFT_OUT[name]: getattr(run, LEFT_OUT[name]) + by})
+        return measure(name, case, truth, wrong)
+
+    beside = np.zeros(len(far), dtype=bool)
+    beside[int(np.argmin(np.where(far > 1e-6 * case.t_end, far, np.inf)))] = True
+    if name != "lam_impulse_path":  # which adds up what acts at the samples beside it
+        assert off(far <= 1e-9 * case.t_end) == before
+    assert off(beside) > before + 1e-6
+
+
+@pytest.mark.parametrize("k", range(6))
+def test_of_rows_that_strike_at_once_one_may_strike_a_little_later(k: int) -> None:
+    """A sample at that instant does not say on which side of the strike it stands, in the run as in the truth."""
+    case, truth = right("pendulums")
+    run, event = truth.trajectory, [e for e in truth.trajectory.events if e.impulse][k]
+    behind = int(np.searchsorted(run.t, event.t, side="right"))
+    later = event.t + 1e-3 * (run.t[behind] - event.t)
+    rows = np.insert(np.arange(len(run.t)), behind, [behind - 1, behind - 1])
+    t = np.insert(run.t, behind, [later, later])
+    parts = {name: getattr(run, name)[rows] for name in ("q", "v", "gap", "lam", "energy", "mode")}
+    events = sorted((replace(e, t=later) if e is event else e for e in run.events), key=lambda e: e.t)
+    apart = replace(run, t=t, events=tuple(events), ledger=None, **parts)
+    assert measure("lam_impulse_path", case, truth, apart) < 1e-9
+
+
 @pytest.mark.parametrize("factor", [0.9, 1.01, 1.1])
 def test_a_factor_on_every_velocity_is_the_residual_of_the_rates(factor: float, ball: tuple[Case, Truth]) -> None:
     case, truth = ball
     run = truth.at(np.linspace(0.0, 0.4, 401))  # the first fall, on which the trapezoidal rule is exact
     run = replace(run, v=factor * run.v)
     assert measure("rate_residual", case, truth, run) == pytest.approx(abs(factor - 1.0), rel=1e-9)
+
+
+def spun(case: Case, rates: Floats, t: Floats) -> Trajectory:
+    """A run in which everything moves at constant rates (nv,), and turns about axes that are fixed in itself."""
+    at, row, parts = 0, 0, []
+    for first in (*case.quaternions, len(case.q0)):
+        parts.append(case.q0[at:first] + t[:, None] * rates[row : (row := row + first - at)])
+        if first < len(case.q0):
+            turn = Rotation.from_quat(case.q0[first : first + 4], scalar_first=True)
+            turned = turn * Rotation.from_rotvec(t[:, None] * rates[row : row + 3])
+            parts.append(turned.as_quat(scalar_first=True))
+            at, row = first + 4, row + 3
+    q, v, none = np.concatenate(parts, axis=1), np.tile(rates, (len(t), 1)), np.zeros((len(t), 0))
+    return Trajectory(t=t, q=q, v=v, lam=none, gap=none, energy=np.zeros((len(t), 2)), mode=none.astype(np.int8))
+
+
+@pytest.mark.parametrize("label", ["rolling_sphere:straight", "stacked_blocks:together", "tossed_cube:tumbles"])
+@settings(max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_the_rates_of_what_turns_in_space_are_held_against_its_turns(label: str, seed: int) -> None:
+    """Each rate by itself: with a factor on one the way is off by as much, with none or about other axes not at all."""
+    rng, case = np.random.default_rng(seed), load(*label.split(":"))
+    rates = rng.choice([-1.0, 1.0], len(case.v0)) * rng.uniform(1.0, 3.0, len(case.v0))
+    run, factor, k = spun(case, rates, np.linspace(0.0, 2.0, 41)), rng.uniform(0.5, 1.5), rng.integers(len(rates))
+    v = run.v.copy()
+    v[:, k] *= factor
+    assert measure("rate_residual", case, None, run) < 1e-12
+    assert measure("rate_residual", case, None, replace(run, v=v)) == pytest.approx(abs(factor - 1.0), rel=1e-9)
+
+
+def test_turns_that_samples_do_not_tell_are_left_out() -> None:
+    """A sphere that turns by seven between two samples stands as if it turned by seven less than once round."""
+    case = load("rolling_sphere", "straight")
+    run = spun(case, np.array([1.0, 2.0, 0.0, 70.0, 0.0, 0.0]), np.linspace(0.0, 1.0, 11))
+    assert measure("rate_residual", case, None, run) < 1e-12
 
 
 def test_the_flange_is_held_against_its_path_once_it_has_settled() -> None:

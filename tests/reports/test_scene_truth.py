@@ -13,11 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Outcome, Tier, Trajectory
+from crossbody.cases import Case, Event, Mode, Outcome, Tier, Trajectory
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
+from crossbody.reports.judging import truth as judging
 from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
-from crossbody.reports.judging.reach import BEFORE, LEAST, MANY, SHORT, SHORTEST, cut_short, followed, motion
+from crossbody.reports.judging.reach import BEFORE, LEAST, MANY, SHORT, SHORTEST, cut_short, followed, motion, tight
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word
@@ -91,6 +92,56 @@ def test_a_chaotic_motion_is_trusted_as_far_as_neighbouring_motions_say() -> Non
     ), truth, "")}  # fmt: skip
     assert rows["position"].verdict == "within"
     assert rows["position"].compared == pytest.approx(row.compared, rel=1e-2)
+
+
+def test_what_errors_have_grown_to_does_not_shrink_again() -> None:
+    """Swings past the top and back: errors come and go, and the largest so far is what a limit must allow."""
+    case = double_pendulum(2.5, 5.0)
+    t, grown = judging._growing(case, tight(case), lambda t: motion(case, case.tight, samples=t), 60.0)
+    assert grown[0] == 1.0
+    assert (np.diff(grown) >= 0.0).all()
+    assert (np.diff(grown) > 0.0).any() and (np.diff(grown) == 0.0).any()  # noqa: PT018 - both, or it shows nothing
+    assert t[-1] == case.t_end
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_horizon_is_the_first_reason_of_all(seed: int) -> None:
+    """What the law leaves open, rows that depend on each other and switch otherwise, and errors that have grown."""
+    rng, case = np.random.default_rng(seed), pendulum(0.5, False, 0.1)
+    touches = np.cumsum(rng.uniform(0.05, 0.1, 5))
+    ends = touches + rng.uniform(0.01, 0.04, 5)
+    k, late = int(rng.integers(5)), rng.choice([-1.0, 1.0]) * rng.choice([1e-8, 1e-3])
+    released, told = bool(rng.integers(2)), bool(rng.integers(2))
+
+    def run(moved: float) -> Trajectory:
+        on, off = touches.copy(), ends.copy()
+        (off if released else on)[k] += moved
+        events = [e for a, b in zip(on, off, strict=True) for e in (
+            Event(t=a, contact=0, before=Mode.FREE, after=Mode.CONTACT),
+            Event(t=b, contact=0, before=Mode.CONTACT, after=Mode.FREE),
+        )]  # fmt: skip
+        empty = engines.load("reference").prepare(case, "compiled").run()
+        return replace(empty, events=tuple(events), counts={"redundant": int(told)})
+
+    until, parted = rng.choice([np.inf, 0.2]), rng.choice([np.inf, 0.9])
+    first = replace(run(0.0), determined_until=float(until))
+    truth = replace(from_run(first, Tier.C, ""), parted=float(parted))
+    t = np.linspace(0.0, 1.0, 201)
+    grown = np.where(t > 0.4, 2.0 * judging.MULTIPLIED, 1.0)
+    found = judging._horizon(case, truth, run(late), t, grown)
+    moved = (ends if released else touches)[k]
+    reasons = [
+        until,
+        min(moved, moved + late) if told and abs(late) > 1e-6 else np.inf,
+        t[t <= 0.4][-1] if parted < 1.0 else np.inf,
+    ]
+    if min(reasons) < 1.0:
+        assert found is not None
+        assert found.until == pytest.approx(min(reasons), abs=1e-12)
+        words = ("slide", "let", "neighbouring")
+        assert words[np.argmin(reasons)] in found.why
+    else:
+        assert found is None
 
 
 def test_sources_that_part_where_neighbouring_motions_do_not_are_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:

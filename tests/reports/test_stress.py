@@ -21,17 +21,18 @@ import pytest
 from unpacked import numbers
 
 from crossbody import cases, engines
-from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome, SceneError, Trajectory, UnknownName
+from crossbody.cases import CaseUnsupported, Event, InvalidValue, Mode, Outcome, SceneError, Trajectory, UnknownName
 from crossbody.reports import suites
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.runs.choice import Pick
+from crossbody.reports.suites import _linear_arcs as linear_arcs
 from crossbody.reports.suites.axis import Levels, Linear, Log, Whole, decades
 from crossbody.reports.suites.contract import Family, Ladder, Suite
 from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
 from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, row
 from crossbody.reports.sweep.map import MAP, stability_map, summary
-from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, residual
+from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, lasting, residual
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.together import together
@@ -283,6 +284,51 @@ def test_within_is_a_run_that_ended_well_with_an_error_that_is_known_and_small()
         said = _verdict(drawn()[0], ended, Error(value=value, tier=tier), 1e-6, left_open, [])[0]
         sound = outcome is Outcome.FINISHED and not left_open > 1e-5
         assert (said == Word.WITHIN) == (sound and tier == "C" and value == 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_exact_arcs_find_dips_that_lie_between_the_places_they_look_at(seed: int) -> None:
+    """A condition that dips below zero by 1e-6 of its size, in whichever part of a step, beside one that holds."""
+    rng = np.random.default_rng(seed)
+    w, phase, depth = rng.uniform(1.0, 20.0, 2), rng.uniform(0.0, 2.5), 10.0 ** rng.uniform(-6.5, -4.5)
+    F = np.zeros((5, 5))
+    F[:2, 2:4], F[2:4, :2] = np.eye(2), -np.diag(w**2)
+    x = np.array([np.cos(phase), 0.3, -w[0] * np.sin(phase), 0.0, 1.0])
+    functionals = np.array([[1.0, 0.0, 0.0, 0.0, 1.0 - depth], [0.0, 1.0, 0.0, 0.0, -2.0]])
+    step = 1.0 / (linear_arcs.STEPS * w.max())
+    states = linear_arcs._powers(F, step) @ x
+    worst = (states @ functionals.T).max(axis=1)
+    wanted = (np.arccos(depth - 1.0) - phase) / w[0]
+    found = linear_arcs.LinearArcs._fall(None, F, states, functionals, worst, step)  # type: ignore[arg-type]
+    if wanted < (linear_arcs.BLOCK - 1) * step:
+        assert found == pytest.approx(wanted, abs=1e-8)
+    elif wanted > (linear_arcs.BLOCK + 1) * step:
+        assert found == np.inf
+
+
+def histories(rng: np.random.Generator) -> tuple[list[Event], list[Event]]:
+    """Events of rows that share instants, and the same with touches that are over at once between and inside them."""
+    right, told, free = [], [], [mode for mode in Mode if mode not in (Mode.STICK, Mode.SLIP)]
+    for i in range(rng.integers(1, 5)):
+        mode = Mode.FREE
+        for t in np.flatnonzero(rng.random(6) < 0.6).astype(float):
+            after = Mode(rng.choice([one for one in free if one != mode]))
+            through = Mode.CONTACT not in (mode, after) and rng.random() < 0.5
+            briefly = after != Mode.CONTACT and rng.random() < 0.5
+            way = [mode, *[Mode.CONTACT] * through, after, *[Mode.CONTACT, after] * briefly]
+            order = np.sort(rng.random(len(way) - 1))
+            steps = zip(order, pairwise(way), strict=True)
+            told += [(t, k, Event(t=t, contact=i, before=one, after=two)) for k, (one, two) in steps]
+            right.append((t, order[0], Event(t=t, contact=i, before=mode, after=after)))
+            mode = after
+    return [one[2] for one in sorted(right, key=lambda e: e[:2])], [one[2] for one in sorted(told, key=lambda e: e[:2])]
+
+
+def test_touches_that_are_over_at_once_leave_no_event_and_others_stay() -> None:
+    run = exact()
+    for seed in range(300):
+        right, told = histories(np.random.default_rng(seed))
+        assert lasting(replace(run, events=tuple(told))).events == tuple(right), seed
 
 
 def test_a_release_without_a_trace_in_the_motion_is_rounding_and_one_with_it_is_an_error(

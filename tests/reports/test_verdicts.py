@@ -6,8 +6,10 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
+from hypothesis import given
 
 from crossbody import cases as cases_
 from crossbody import engines
@@ -16,11 +18,12 @@ from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports import metrics
 from crossbody.reports.commands import bands
+from crossbody.reports.judging import comparison
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
-from crossbody.reports.judging.verdict import Word, band, exit_code, judge, limit_for
+from crossbody.reports.judging.verdict import FACTOR, Word, band, exit_code, judge, limit_for
 
 LIMIT = Limit(metric="position", value=1e-3, why="because")
 KNOWN = replace(LIMIT, known="it is known to do that", known_size=1.0)
@@ -51,6 +54,79 @@ CLAIM = Claim(metric="contacts", expected=3.0, tier=Tier.B, source="a figure")
 )
 def test_judgement(value: float, limit: Limit | None, claim: Claim | None, word: Word) -> None:
     assert judge(value, limit, claim)[0] == word
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+@pytest.mark.parametrize("stored", [None, math.nan, 1e-3])
+@pytest.mark.parametrize("claimed", [False, True])
+@pytest.mark.parametrize("limit", ["", "plain", "known", "covers none"])
+def test_a_number_that_is_missing_has_one_word(
+    limit: str, claimed: bool, stored: float | None, hidden: bool, case: Case, motion: Trajectory
+) -> None:
+    """Hidden by the engine; known to be none; stored as none of a known deviation; else outside, claimed or not."""
+    claim = Claim(metric="contacts", expected=3.0, tier=Tier.B, source="a figure")
+    given = {
+        "plain": {},
+        "known": {"known": "it has none"},
+        "covers none": {"known": "it has none", "covers_none": True},
+    }
+    limits = () if not limit else (Limit(metric="contacts", value=1.0, why="because", **given[limit]),)
+    entry = Entry(engine="fake", profile="good", run=motion, hidden={"lam": "not shown"} if hidden else {})
+    judge_ = comparison._Judge(replace(case, limits=limits, claims=(claim,) * claimed), entry, truth_of(case), "run")
+    judge_.stored = {} if stored is None else {"contacts": stored}
+    row = judge_.missing("contacts", "1", "There is no such number.", "lam")
+    expected = 3.0 if claimed else math.nan
+    assert (row.expected, row.value) == pytest.approx((expected, math.nan), nan_ok=True)
+    if hidden:
+        assert (row.verdict, row.why) == (Word.INFO, "not shown")
+    elif limit == "covers none" and not claimed:
+        assert (row.verdict, row.why) == (Word.INFO, "There is no such number. Known: it has none.")
+    elif limit in ("known", "covers none") and stored is not None and math.isnan(stored):
+        assert (row.verdict, row.why) == (Word.EXPECTED, "it has none")
+    else:
+        assert row.verdict == Word.OUTSIDE
+        assert row.why.startswith("There is no such number.")
+        assert ("3 claimed: a figure" in row.why) == claimed
+    if row.verdict != Word.INFO:
+        assert row.tier == (Tier.B if claimed else Tier.A).value
+
+
+@given(
+    value=st.sampled_from([0.0, 0.5, 0.99, 1.01, 1.9, 2.1, 3.9, 4.1, 19.0, 21.0, math.nan, math.inf]),
+    sign=st.sampled_from([-1.0, 1.0]), known=st.booleans(), least=st.sampled_from([0.0, 2.0]),
+    size=st.sampled_from([4.0, math.inf]), stored=st.sampled_from([None, 2.0 * FACTOR, 2.0 / FACTOR, 10.0]),
+    claimed=st.booleans(), limited=st.booleans(),
+)  # fmt: skip
+def test_the_word_of_a_number_is_that_of_the_first_that_speaks(
+    value: float,
+    sign: float,
+    known: bool,
+    least: float,
+    size: float,
+    stored: float | None,
+    claimed: bool,
+    limited: bool,
+) -> None:
+    """A limit of 1 with a property that is known from `least` to `size`, else to a factor of what is stored."""
+    limit = Limit(metric="x", value=1.0, known="known" if known else "", known_least=least * known, known_size=size)
+    claim = replace(CLAIM, metric="x") if claimed else None
+    said = sign * value + (3.0 if claimed else 0.0)
+    sizes = (
+        (least, size) if least and known else (stored / FACTOR, stored * FACTOR) if stored is not None else (0.0, size)
+    )
+    if not math.isfinite(value):
+        wanted = Word.OUTSIDE
+    elif not limited:
+        wanted = Word.INFO if not claimed else Word.WITHIN if value == 0.0 else Word.OUTSIDE
+    elif value <= 1.0:
+        wanted = Word.WITHIN
+    elif not known:
+        wanted = Word.OUTSIDE
+    elif sizes == (0.0, math.inf):
+        wanted = Word.INFO
+    else:
+        wanted = Word.EXPECTED if sizes[0] <= value <= sizes[1] else Word.OUTSIDE
+    assert judge(said, limit if limited else None, claim, stored)[0] == wanted
 
 
 def test_the_reason_of_a_known_deviation_is_told() -> None:

@@ -1,0 +1,74 @@
+"""The one sentence about a run: its counts add up, and whom it names is farthest off."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crossbody.reports.judging.told import NAMED, runs_of, sentence
+from crossbody.reports.judging.verdict import Word
+
+KINDS = ("within", "expected", "outside", "unbounded", "unlimited", "skipped")
+
+
+def row(who: str, verdict: Word, metric: str = "position", **more: Any) -> dict[str, Any]:
+    engine, _, profile = who.partition(":")
+    return {
+        "case": "ball", "variant": "hard", "engine": engine, "profile": profile, "metric": metric, "verdict": verdict,
+        "value": 1e-4, "expected": None, "limit": 1e-3, "why": "", "compared": 1.0,
+    } | more  # fmt: skip
+
+
+def rows_of(who: str, kind: str, times: float) -> list[dict[str, Any]]:
+    """What a run of some kind says; `times` is by how many times it is beyond its limit, where it is."""
+    if kind == "skipped":
+        return [row(who, Word.SKIPPED, "run", value=None, limit=None)]
+    finished = row(who, Word.WITHIN, "finished", value=1.0, expected=1.0, limit=0.0)
+    beyond = {"value": times * 1e-3}
+    return [finished, *{
+        "within": [row(who, Word.WITHIN), row(who, Word.INFO, "speed", value=7.0, limit=None)],
+        "expected": [row(who, Word.WITHIN, "velocity"), row(who, Word.EXPECTED, **beyond)],
+        "outside": [row(who, Word.OUTSIDE, **beyond), row(who, Word.OUTSIDE, "velocity", value=1.5e-3)],
+        "unbounded": [row(who, Word.INFO, **beyond), row(who, Word.WITHIN, "velocity")],
+        "unlimited": [row(who, Word.INFO, limit=None)],
+    }[kind]]  # fmt: skip
+
+
+def named(text: str, begin: str) -> tuple[list[str], int]:
+    """Whom a part of the sentence names, and how many more there are."""
+    part = re.search(rf"{begin} (.*?)\.(?= [A-Z]|$)", text)
+    if part is None:
+        return [], 0
+    more = re.search(r"; and (\d+) more", part[1])
+    names = part[1][: more.start()] if more else part[1]
+    return [one.split(" ")[0] for one in names.split("; ")], int(more[1]) if more else 0
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    kinds = rng.choice(KINDS, rng.integers(1, 16), p=[0.2, 0.2, 0.25, 0.2, 0.1, 0.05])
+    times = dict(zip((f"e{k}:p" for k in range(len(kinds))), rng.uniform(2.0, 900.0, len(kinds)), strict=True))
+    by = {kind: [who for who, one in zip(times, kinds, strict=True) if one == kind] for kind in KINDS}
+    truth = row("truth:", Word.WITHIN, "truth", compared=float(rng.choice([0.31, 1.0])))
+    told = [truth, *(one for who, kind in zip(times, kinds, strict=True) for one in rows_of(who, kind, times[who]))]
+    text = sentence(runs_of(told))
+    judged = sum(len(by[kind]) for kind in ("within", "expected", "outside", "unbounded"))
+    if not judged and by["unlimited"]:
+        assert text == "Nothing is judged, since no number has a limit."
+        return
+    count, of = map(int, re.findall(r"^(\d+) of (\d+) runs are within all limits", text)[0])
+    assert (count, of) == (len(by["within"]), judged)
+    deviating = re.search(r"(\d+) deviates? as expected \((.*?)\)", text)
+    assert (deviating[2].split(", ") if deviating else []) == by["expected"]
+    assert not deviating or int(deviating[1]) == len(by["expected"])
+    for kind, begin in (("outside", "Off:"), ("unbounded", "Off by a known cause without a bound:")):
+        farthest = sorted(by[kind], key=lambda who: -times[who])
+        assert named(text, begin) == (farthest[:NAMED], max(len(farthest) - NAMED, 0))
+        for who in farthest[:NAMED]:
+            assert f"{who} on ball:hard (position {times[who] * 1e-3:.2g}, {times[who]:.2g} times its limit" in text
+    assert named(text, "Without a limit:") == (by["unlimited"][:NAMED], max(len(by["unlimited"]) - NAMED, 0))
+    assert ("0.31 of the horizon" in text) == (truth["compared"] < 1.0)
