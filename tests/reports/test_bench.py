@@ -136,7 +136,9 @@ def test_orders_are_held_against_promises(rows: pd.DataFrame) -> None:
 @settings(max_examples=30)
 @given(
     st.lists(
-        st.tuples(st.floats(0.6, 6.0), st.floats(-2.0, 1.0), st.integers(3, 8), st.integers(0, 5)), min_size=1, max_size=4
+        st.tuples(st.floats(0.6, 6.0), st.floats(-2.0, 1.0), st.integers(3, 8), st.integers(0, 5)),
+        min_size=1,
+        max_size=4,
     )
 )
 def test_a_floor_takes_nothing_from_an_order(drawn: list[tuple[float, float, int, int]]) -> None:
