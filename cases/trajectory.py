@@ -115,6 +115,8 @@ class Trajectory:
             sol(t, side="left") what they are before an event there; None where not asked for, by `dense=True`.
         determined_until: until when the law determines the motion, s; finite where contacts that slide share a load as
             no law says (the message names it `indeterminate`).
+        unique_until: until when one motion alone keeps the law, s; finite where more than one set of sticking, sliding
+            and open contacts does (`modes_not_unique`).
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 
@@ -136,6 +138,7 @@ class Trajectory:
     inputs: Inputs | None = None
     control_s: float = 0.0
     determined_until: float = math.inf
+    unique_until: float = math.inf
     sol: Callable[..., tuple[Floats, Floats]] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:

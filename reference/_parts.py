@@ -21,6 +21,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
 
     environment: tuple[str, Any] | None = None  # of a part: where its constants are, and under which name
     _linking_libraries: list[Any]
+    _shared_module: Any
 
     def finalize(self) -> None:
         """Put the whole together, optimise it and make it callable."""
@@ -113,3 +114,34 @@ class PartPasses(WholePasses):
         flags = self.state.flags
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
         return super()._compile_core()
+
+
+class _ReadBack(_Library):
+    """Code of a function that was read back; its text for other code to take in is parsed where that is asked for."""
+
+    bitcode = b""
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self.bitcode)
+        return self._shared_module
+
+
+def read_back(codegen: Any, kept: tuple[str, str, tuple[bytes, bytes]], description: Any) -> Any:
+    """Make code callable that was kept, as numba does but for the text that it parses at once.
+
+    Args:
+        codegen: of the target.
+        kept: what numba serialises a library to.
+        description: of the function.
+    """
+    name, _, (code, bitcode) = kept
+    library = _ReadBack(codegen, name)
+    library.bitcode = bitcode
+    library.enable_object_caching()
+    library._set_compiled_object(code)
+    library._finalize_final_module()
+    codegen._engine._defined_symbols |= {
+        description.llvm_func_name, description.llvm_cpython_wrapper_name, description.llvm_cfunc_wrapper_name,
+    }  # fmt: skip
+    return library

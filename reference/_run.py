@@ -72,6 +72,8 @@ class CompiledRun:
 
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         self.system, self.options = system, options
+        # First: while it is compiled another process compiles what the rest asks for.
+        self.call = entry(tuple(system.kernels.values()))
         self.start_state = np.concatenate([q0, v0])
         samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)
         n, nq, nc = system.n, system.nq, system.nc
@@ -99,7 +101,6 @@ class CompiledRun:
         self._modes = initial_modes(system, q0, v0)
         self.callback: Any = None
         self.marks: Marks | None = None
-        self.call = entry(tuple(system.kernels.values()))
 
     def _state_template(self, natural: bool) -> Any:
         system, options = self.system, self.options
@@ -270,6 +271,7 @@ class CompiledRun:
             if self.nz
             else None,
             determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
+            unique_until=float(state["unique_until"]) if state["not_unique"] else np.inf,
         )  # fmt: skip
         if self.callback is not None:
             controller = self.callback.controller

@@ -24,18 +24,22 @@ import numba.core.config as numba_config
 from numba.core import sigutils, types, typing
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.environment import Environment, lookup_environment
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from crossbody.reference import code_store
 from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values
-from crossbody.reference._parts import PartPasses, WholePasses
+from crossbody.reference._parts import PartPasses, WholePasses, read_back
 
 _SETTINGS = (
     "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX", "DEBUGINFO_DEFAULT",
     "CPU_NAME", "CPU_FEATURES", "FULL_TRACEBACKS", "LLVM_PASS_TIMINGS",
 )  # fmt: skip
+
+FORMAT = "2"
+"""What `save_overload` writes; another number for every change of it."""
 
 
 def debugging() -> bool:
@@ -185,7 +189,7 @@ class _Overloads:
             return None
         rtsys.initialize(target_context)  # all that code which is read back needs of what a compiler sets up
         try:
-            return CompileResult._rebuild(target_context, *pickle.loads(data))
+            return _rebuilt(target_context, *pickle.loads(data))
         except Exception as error:
             # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
             store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
@@ -196,10 +200,49 @@ class _Overloads:
         store = code_store.current() if self.content else None
         if store is None or result.library.has_dynamic_globals or any(not part.can_cache for part in result.lifted):
             return
-        store.write(self.key(self.content, sig), dumps(result._reduce()))
+        library, description, environment, *rest, others = result._reduce()
+        kept = library, description, _told(environment), *rest, [_told(one) for one in others]
+        store.write(self.key(self.content, sig), dumps(kept))
 
     def flush(self) -> None:
         """Forget nothing: what is stale has another key."""
+
+
+def _told(environment: Environment) -> tuple[str, list[Any], str]:
+    """What is kept of the constants of a function: the module that it stands in, themselves, and their name."""
+    return environment.globals["__name__"], list(environment.consts), environment.env_name
+
+
+def _environment(module: str, constants: list[Any], name: str) -> Environment:
+    """Give a function its constants back.
+
+    numba imports its module for that, which compiled code does not ask for: of numba's own linear algebra it takes
+    longer than all else.
+    """
+    found = lookup_environment(name)
+    if found is None:
+        found = Environment({"__name__": module})
+        found.consts[:], found.env_name = constants, name
+        Environment._memo[name] = found
+    return found
+
+
+def _rebuilt(
+    context: Any, kept: Any, description: Any, told: Any, signature: Any, objectmode: bool, lifted: Any,
+    annotation: str, reload_init: Any, others: Any,
+) -> CompileResult:  # fmt: skip
+    """Make callable what `save_overload` took apart."""
+    for begin in reload_init:
+        begin()
+    library, environment = read_back(context.codegen(), kept, description), _environment(*told)
+    entry = context.get_executable(library, description, environment)
+    environments = tuple(_environment(*one) for one in others)
+    for one in environments:
+        library.codegen.set_env(one.env_name, one)
+    return CompileResult(
+        context.typing_context, context, entry, None, annotation, signature, objectmode, lifted, description, library,
+        None, environment, None, reload_init, environments,
+    )  # fmt: skip
 
 
 @cache
@@ -207,7 +250,7 @@ def machine() -> tuple[str, ...]:
     """Return what compiled code depends on beside its source: versions, processor, settings of numba."""
     target = numba.core.registry.cpu_target.target_context.codegen().magic_tuple()
     settings = [f"{name}={getattr(numba_config, name, None)}" for name in _SETTINGS]
-    return (numba.__version__, llvmlite.__version__, platform.python_version(), str(target), *settings)
+    return (FORMAT, numba.__version__, llvmlite.__version__, platform.python_version(), str(target), *settings)
 
 
 class Part(Lean):

@@ -31,7 +31,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines.linear import Spot, Tangent, in_contact
 from crossbody.engines.mujoco._globals import Hook, hooked
-from crossbody.engines.mujoco._observe import mass_matrix
+from crossbody.engines.mujoco._observe import constraint_jacobian, mass_matrix
 from crossbody.engines.mujoco._rows import LIMITS, TOUCH
 
 EPS = 1e-5
@@ -156,7 +156,7 @@ def _pressed(stand: Stand, slope: Callable[[], Floats]) -> Floats:
     data = stand.data
     mujoco.mj_forward(stand.model, data)
     mass = mass_matrix(stand.model, data)
-    J = np.array(data.efc_J).reshape(-1, stand.model.nv)[np.isin(data.efc_type, ONE_WAY)]
+    J = constraint_jacobian(stand.model, data)[np.isin(data.efc_type, ONE_WAY)]
     if not len(J):
         return slope()
     first = slope()

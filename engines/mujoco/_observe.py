@@ -20,6 +20,16 @@ def mass_matrix(model: Any, data: Any) -> Floats:
     return full
 
 
+def constraint_jacobian(model: Any, data: Any) -> Floats:
+    """Return the dense rows (nefc, nv) that are active; MuJoCo keeps those of 60 velocities and more sparse."""
+    if not mujoco.mj_isSparse(model):
+        return np.array(data.efc_J).reshape(-1, model.nv)
+    full: Floats = np.zeros((data.nefc, model.nv))
+    if data.nefc:
+        mujoco.mju_sparse2dense(full, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+    return full
+
+
 def numbers(scene: Scene) -> dict[str, int]:
     """Return MuJoCo's number of every body, and of the world, whose name is empty; a file need not name them."""
     return {"": 0, **{body.name: i for i, body in enumerate(scene.bodies, start=1)}}

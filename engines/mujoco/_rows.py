@@ -19,7 +19,7 @@ from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import corner_names
 from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
-from crossbody.engines.mujoco._observe import numbers
+from crossbody.engines.mujoco._observe import constraint_jacobian, numbers
 from crossbody.engines.mujoco._rubs import AT_BOUND, Rub, Rubs
 from crossbody.engines.nearest import corners
 
@@ -177,7 +177,7 @@ class Rows:
 
     def jacobian(self) -> Floats:
         """Return H (nc, nv); 0 of a row that is not there."""
-        J, H = np.array(self.data.efc_J).reshape(-1, self.model.nv), np.zeros((self.nc, self.model.nv))
+        J, H = constraint_jacobian(self.model, self.data), np.zeros((self.nc, self.model.nv))
         H[: self.always] = J[: self.always]
         for j, row in self.present():
             H[row] = J[j]
@@ -204,7 +204,7 @@ class Rows:
 
     def _place(self, j: int, kind: int, part: int) -> int:
         """Return which bound an active row is: of a joint the upper one has a falling gap, of a tendon it is nearer."""
-        J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[j]
+        J = constraint_jacobian(self.model, self.data)[j]
         if kind == LIMITS[0] and self.scene.joints[part].type == "ball":
             return self.places[kind, part, True]
         if kind == LIMITS[0]:

@@ -23,6 +23,7 @@ from crossbody.engines._machines import elastic_part
 from crossbody.engines.mujoco._direct import solref_of
 from crossbody.engines.mujoco._drift import Drift
 from crossbody.engines.mujoco._globals import Hook
+from crossbody.engines.mujoco._observe import constraint_jacobian
 from crossbody.engines.mujoco._rows import LIMITS, Present, Rows
 
 REACH = 1e-12
@@ -190,15 +191,15 @@ class Switched(Rows):
 
     def _pull(self, j: int, row: int) -> float:
         """Return the multiplier that a row would have if it could pull, as if it were alone: no kink where it ends."""
-        data, nv = self.data, self.model.nv
-        J = np.array(data.efc_J).reshape(-1, nv)[j]
-        moved = np.empty((1, nv))
+        data = self.data
+        J = constraint_jacobian(self.model, data)[j]
+        moved = np.empty((1, len(J)))
         mujoco.mj_solveM(self.model, data, moved, J[None])
         return float((self.wanted[row] - J @ data.qacc) / (J @ moved[0]))
 
     def _delassus(self, present: list[int]) -> tuple[Floats, Floats]:
         """Return H (n, nv) of the rows that are always on and of those at some places, and H M^-1 H'."""
-        J = np.array(self.data.efc_J).reshape(-1, self.model.nv)[[*range(self.always), *present]]
+        J = constraint_jacobian(self.model, self.data)[[*range(self.always), *present]]
         moved = np.empty_like(J)
         mujoco.mj_solveM(self.model, self.data, moved, J)
         return J, J @ moved.T
@@ -218,7 +219,7 @@ class Switched(Rows):
             margin[i] = FAR
         mujoco.mj_forward(self.model, self.data)
         data, found = self.data, np.zeros((3, self.nc))
-        J = np.array(data.efc_J).reshape(-1, self.model.nv)
+        J = constraint_jacobian(self.model, data)
         for j, row in [*((k, k) for k in range(self.always)), *self.present()]:
             gap = data.efc_pos[j] - self.surface[row]
             found[:, row] = gap, data.efc_vel[j], J[j] @ data.qacc_smooth

@@ -32,7 +32,7 @@ from crossbody.engines.mujoco._direct import without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._gated import GatedRows
 from crossbody.engines.mujoco._globals import Hook, hooked
-from crossbody.engines.mujoco._observe import mass_matrix, numbers
+from crossbody.engines.mujoco._observe import constraint_jacobian, mass_matrix, numbers
 from crossbody.engines.mujoco._obvious import Obvious, obvious
 from crossbody.engines.mujoco._rows import Rows
 from crossbody.engines.mujoco._scene import Scene as Prepared
@@ -167,7 +167,7 @@ def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
     data.qpos[:], data.qvel[:] = q, v
     mujoco.mj_forward(model, data)
     M, n, step = mass_matrix(model, data), model.nv, 1e-6
-    H = np.array(data.efc_J).reshape(-1, n)[: data.ne]
+    H = constraint_jacobian(model, data)[: data.ne]
     lift = step * np.eye(n)
 
     def forces(d: Floats, rate: Floats) -> Floats:

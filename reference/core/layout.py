@@ -142,7 +142,8 @@ STATE = np.dtype(
         ("sets", "i8"),  # of modes that were tried
         ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters,
         ("determined_until", "f8"),  # s: from then on
-        ("not_unique", "i8"),  # instants at which more than one set of modes was consistent
+        ("not_unique", "i8"),  # instants at which more than one set of modes was consistent,
+        ("unique_until", "f8"),  # s: and the first of them
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("jam", "i8"),  # contacts have just come to where they jam together
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding

@@ -40,7 +40,7 @@ TURNED = 1e-12
 MOST_TURN = 0.5  # rad, of one of them
 AROUND, HALVINGS = 24, 50  # directions that are looked at where that leads nowhere, and halvings between two
 MOST_SETS = 256
-FEW = 2  # contacts, of which all sets are tried to see whether others are consistent as well
+FEW = 64  # sets, which are all tried to see whether others are consistent as well
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 CLEAR_OF_A_JAM = 1e-5  # determinant, of rows of size 1, of what goes on where others jam
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
@@ -509,13 +509,35 @@ def _put_back(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def _count_others(s: Any, m: Model, w: Work) -> None:
-    """Note whether another set is consistent as well and leads to another motion, where there are few to try."""
-    contacts, standing = 0, 0
+def _choices(m: Model, w: Work, i: int) -> int:
+    """How many modes a contact may have: what slides goes on as it does, or presses no more."""
+    return 4 if w.stands[i] else 2
+
+
+@compiled
+def _number(s: Any, m: Model, w: Work, place: int) -> int:
+    """The number of `_vary` for a place among all combinations of `_choices`."""
+    number, unit = 0, 1
     for j in range(s.na):
-        contacts += has_friction(m, w.idx[j])
-        standing += has_friction(m, w.idx[j]) and w.stands[w.idx[j]]
-    if contacts > FEW or standing == 0:
+        i = w.idx[j]
+        if has_friction(m, i):
+            digit, place = place % _choices(m, w, i), place // _choices(m, w, i)
+            number += unit * (digit if w.stands[i] else 2 * digit)
+            unit *= 4
+    return number
+
+
+@compiled
+def _count_others(s: Any, m: Model, w: Work) -> None:
+    """Note whether another set is consistent as well and leads to another motion, where there are few to try.
+
+    Contacts that all slide may be such: friction makes what they do to each other no P-matrix, though it is symmetric.
+    """
+    sets = 1
+    for j in range(s.na):
+        if has_friction(m, w.idx[j]) and sets <= FEW:
+            sets *= _choices(m, w, w.idx[j])
+    if sets > FEW:
         return
     _keep(s, w)
     _evaluate(s, m, w)
@@ -527,13 +549,15 @@ def _count_others(s: Any, m: Model, w: Work) -> None:
     for i in range(s.nc):
         w.kept_other[i] = w.way[i]
     found = False
-    for number in range(1, 4**contacts):
+    for place in range(1, sets):
         for i in range(s.nc):
             w.way[i] = w.kept_other[i]
-        _vary(s, m, w, number)
+        _vary(s, m, w, _number(s, m, w, place))
         if _judge(s, m, w) < 0 and _jammed(s, m, w) < 0:
             for j in range(s.na):
                 found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
+    if found and s.not_unique == 0:
+        s.unique_until = s.t
     s.not_unique += found
     _put_back(s, m, w)
 

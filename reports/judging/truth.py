@@ -129,7 +129,7 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
         if isinstance(found, str):
             return _integrated(case, first, "compiled", f" ({found})")
         second = found
-    t, grown = _growing(case, dense, at)
+    t, grown = _growing(case, dense, at, budget)
     truth = Truth(
         tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
         grows=float(grown[-1]), joined=case.general,
@@ -211,6 +211,7 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
         return None
     reasons = [
         (truth.trajectory.determined_until, "the law does not say how contacts that slide share their load"),
+        (truth.trajectory.unique_until, "more than one set of sticking, sliding and open contacts keeps the law"),
         (_arbitrary(truth, second, case), "the law does not say which of rows that depend on each other lets go first"),
     ]
     if truth.parted < case.t_end and grown[-1] > MULTIPLIED:
@@ -235,13 +236,14 @@ def _arbitrary(truth: Truth, second: Trajectory, case: Case) -> float:
     return math.inf
 
 
-def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) -> tuple[Floats, Floats]:
+def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], limit: float) -> tuple[Floats, Floats]:
     """Instants (n,), s, and by how much more than in free flight errors of a scene's start have grown until then (n,).
 
-    Its velocities are put off, on its rows.
+    Its velocities are put off, on its rows. A neighbour that gets less far, or takes longer than a limit, s, tells of
+    growth as far as it gets: limits are the stricter for what is not known.
     """
-    fastest = float(np.max(np.abs(truth.v), initial=0.0))
-    if not case.general or not truth.outcome.ok or not RESTS < fastest < math.inf:
+    fastest = max(float(np.max(np.abs(truth.v), initial=0.0)), RESTS)  # what balances falls, however slowly
+    if not case.general or not truth.outcome.ok or not fastest < math.inf:
         return np.array([0.0, case.t_end]), np.ones(2)
     from crossbody.engines.equations import system_of
 
@@ -252,10 +254,11 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory]) 
         way -= np.linalg.lstsq(held, held @ way, rcond=None)[0] if len(held) else 0.0
         off = NUDGE * fastest
         nudged = replace(case, v0=case.v0 + off * way)
-        run = motion(nudged, case.tight, samples=t)
-        if run.outcome.ok:
-            apart = np.max(differences(run.q, exact, case.quaternions), axis=1)
-            most = np.maximum(most, np.maximum.accumulate(apart) / (off * case.t_end))
+        run = motion(nudged, case.tight, samples=t, time_limit=limit)
+        count = int(np.searchsorted(t, run.t[-1], side="right")) if len(run.t) else 0
+        apart = np.zeros(len(t))
+        apart[:count] = np.max(differences(run.q[:count], exact[:count], case.quaternions), axis=1)
+        most = np.maximum(most, np.maximum.accumulate(apart) / (off * case.t_end))
     return t, most
 
 

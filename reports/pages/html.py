@@ -18,6 +18,7 @@ from markupsafe import Markup
 
 from crossbody.cases import OutputError
 from crossbody.reports.figures.section import Column, Figure, Kind, Section, Table, Written
+from crossbody.reports.pages.kept import KeptTemplates
 from crossbody.reports.pages.packing import packed_text, packed_value
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -65,7 +66,8 @@ def environment() -> Environment:
     """Templates that escape whatever is put in, and refuse what is not there."""
     made = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
+        lstrip_blocks=True, bytecode_cache=KeptTemplates(),
+        optimized=False,  # what is kept has no result of a filter in it
     )  # fmt: skip
     made.filters |= {
         "number": number,

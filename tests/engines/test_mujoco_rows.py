@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from random_scenes import random_scene, random_state, with_own_laws
 
 from crossbody.cases import Mode
+from crossbody.cases import load as load_case
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import contacts
@@ -57,6 +59,29 @@ def pushing(scene: Scene, seed: int) -> int:
 def test_a_row_that_pushes_follows_the_law(seed: int) -> None:
     """H v' + H'v + a1 h' + a0 h = 0 at MuJoCo's v', by the reference's rows, with all terms of their curvature."""
     assert pushing(with_own_laws(random_scene(seed).replace(loops=()), seed), seed)
+
+
+def test_rows_of_many_velocities_are_read_as_those_of_few(tmp_path: Path) -> None:
+    """MuJoCo keeps rows sparse from 60 velocities on: bounds, a tendon's and a contact's beside so many that rest."""
+    runs = []
+    for many in (0, 60):
+        beside = "".join(f'<body pos="{i} 9 0"><joint type="slide"/><geom size=".1"/></body>' for i in range(many))
+        path = tmp_path / f"{many}.xml"
+        path.write_text(f"""<mujoco><option gravity="0 0 -9.81"/><default><geom contype="0" conaffinity="0"/></default>
+          <worldbody><geom name="floor" type="plane" size="1 1 1" contype="1"/>
+          <body pos="0 0 .3"><joint name="a" type="slide" axis="0 0 1" range="-.1 1" limited="true"/>
+          <geom size=".1"/></body>
+          <body pos="1 0 .3"><joint name="b" type="slide" axis="0 0 1"/><geom size=".1"/></body>
+          <body pos="2 0 .3"><joint type="slide" axis="0 0 1"/><geom name="ball" size=".1" conaffinity="1"/></body>
+          {beside}</worldbody>
+          <tendon><fixed limited="true" range="-.05 1"><joint joint="b" coef="1"/></fixed></tendon></mujoco>""")
+        case = load_case(str(path), friction=1, t_end=0.4)
+        runs.append(load("mujoco").prepare(case, "as_is").run())
+    few, lots = runs
+    assert np.abs(lots.q[:, :3] - few.q).max() < 1e-12
+    assert (lots.mode == few.mode).all()
+    assert np.abs(lots.lam - few.lam).max() < 1e-9 * few.lam.max()
+    assert (few.lam.max(axis=0) > 0.0).sum() >= 3
 
 
 @pytest.mark.parametrize("seed", range(9))

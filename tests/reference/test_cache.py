@@ -88,6 +88,27 @@ CIRCLES = """
     print(*e, sum(energy._cache_hits.values()))
 """
 
+CALLS = """
+    import sys
+    import numpy as np
+    from crossbody.reference import kernels
+
+    @kernels.energy
+    def energy(q, v, p, e):
+        e[0], e[1] = 7.0 * q[0], 0.0
+
+    @kernels.gaps
+    def gaps(t, q, v, p, h, hd):
+        energy(q, v, p, h)
+        hd[0] = 2.0 * h[0]
+
+    q, h, hd = np.full(1, 3.0), np.zeros(2), np.zeros(1)
+    energy(q, q, q, h)
+    if sys.argv[1:]:
+        gaps(0.0, q, q, q, h, hd)
+    print(h[0], hd[0], sum(energy._cache_hits.values()))
+"""
+
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
@@ -115,6 +136,13 @@ def test_helpers_that_call_themselves_or_each_other_are_found_also_in_code_that_
             [sys.executable, str(tmp_path / "circles.py")], capture_output=True, text=True, check=True
         )
         assert done.stdout.split() == ["131.0", "128.0", str(hits)]
+
+
+def test_code_that_was_read_back_is_taken_in_by_code_that_is_compiled(tmp_path):
+    (tmp_path / "calls.py").write_text(textwrap.dedent(CALLS))
+    for more, told in (([], "21.0 0.0 0"), (["both"], "21.0 42.0 1"), (["both"], "21.0 42.0 1")):
+        command = [sys.executable, str(tmp_path / "calls.py"), *more]
+        assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() == told.split()
 
 
 def _kernel(value):

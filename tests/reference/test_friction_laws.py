@@ -133,7 +133,36 @@ def test_modes_are_a_set_that_agrees_with_its_forces(seed: int) -> None:
         assert sets
         assert run_.outcome is not Outcome.NO_CONSISTENT_MODES, run_.message
         assert min(np.abs(run_.v[-1] / run_.t[-1] - a).max() for a in sets) < 1e-3
-        assert k > 2 or ("not_unique" in run_.counts) == (len(sets) > 1)
+        assert k > 3 or ("not_unique" in run_.counts) == (len(sets) > 1)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_contacts_that_slide_are_told_where_more_than_one_set_of_them_presses(seed: int) -> None:
+    """Of linear complementarity problems that are no P-matrix: all subsets of rows, solved one by one."""
+    rng, told = np.random.default_rng(100 + seed), 0
+    for _ in range(60):
+        H, force, mu, k = random_problem(rng, most=4, rough=3.0)
+        if len(force) < 2 * k:
+            continue
+        slip = rng.choice([-1.0, 1.0], size=k)
+        H[k:] -= slip[:, None] * rng.uniform(0.0, 2.0) / mu * np.roll(H[:k], 1, axis=0)  # one presses by the next
+        v0 = np.linalg.lstsq(H, np.concatenate([np.full(k, -1e-3), slip]), rcond=None)[0]
+        C, wanted = H[:k] - mu * slip[:, None] * H[k:], 1e-3 * 200.0 - H[:k] @ force
+        margins = []
+        for on in (np.flatnonzero(one) for one in product((False, True), repeat=k)):
+            x = np.linalg.solve(H[on] @ C[on].T, wanted[on]) if len(on) else np.zeros(0)
+            jams = np.linalg.det(H[on] @ C[on].T) < 0.0 if len(on) else False
+            margins.append(-np.inf if jams else min([*x, *np.delete(H[:k] @ C[on].T @ x - wanted, on)]))
+        if np.abs(margins).min() < 1e-3:  # the law is all but undecided
+            continue
+        run_ = simulate(linear(H, force, mu, k), np.zeros(len(force)), v0, 1e-9, rtol=1e-6, max_steps=3)
+        if run_.outcome in (Outcome.PAINLEVE, Outcome.NO_CONSISTENT_MODES):
+            continue
+        several = np.sum(np.array(margins) > 0.0) > 1
+        assert ("not_unique" in run_.counts) == several
+        assert (run_.unique_until == 0.0) == several
+        told += several
+    assert told
 
 
 def test_turning_the_frame_of_a_plane_changes_nothing() -> None:

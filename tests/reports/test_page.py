@@ -15,6 +15,7 @@ from urllib.parse import unquote
 import numpy as np
 import plotly.graph_objects as go
 import pytest
+from jinja2 import Environment, FileSystemLoader
 from ladder import ladder
 from unpacked import numbers, value_of, whole
 
@@ -28,6 +29,7 @@ from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import file_name
+from crossbody.reports.pages.kept import KeptTemplates
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
@@ -460,3 +462,18 @@ def test_steps_of_a_run_begin_where_the_one_before_ended(count: int) -> None:
     behind = dict(zip(np.unique(t)[:-1].tolist(), np.diff(np.unique(t)).tolist(), strict=True))
     assert [behind[start] for start in starts.tolist()] == lengths.tolist()
     assert len(starts) == count - 1 if count < 10 else 100 < len(starts) < count
+
+
+def test_a_template_is_compiled_once_and_again_when_it_changes(tmp_path, monkeypatch):
+    monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path / "cache"))
+
+    def shown(text: str) -> str:
+        (tmp_path / "one.html").write_text(text)
+        made = Environment(loader=FileSystemLoader(tmp_path), bytecode_cache=KeptTemplates())
+        return made.get_template("one.html").render(name="<crossbody>")
+
+    first = shown("{{ name }}")
+    with monkeypatch.context() as changed:
+        changed.setattr(Environment, "compile", None)
+        assert shown("{{ name }}") == first
+    assert shown("{{ name | length }}") == "11"

@@ -210,6 +210,55 @@ def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium
         assert drawn > 10
 
 
+FRAMES = """new Promise((done) => {
+    const draw = requestAnimationFrame, began = performance.now();
+    let [frames, busy] = [0, 0];
+    window.requestAnimationFrame = (task) => draw((t) => {
+        const from = performance.now();
+        task(t);
+        busy += performance.now() - from;
+    });
+    const count = () => {
+        frames += 1;
+        if (performance.now() - began < 3000) return draw(count);
+        window.requestAnimationFrame = draw;
+        done([frames / 3, busy / frames]);
+    };
+    draw(count);
+})"""
+"""Frames a second for three seconds, and what scripts take of each, ms."""
+
+
+@pytest.mark.bench
+def test_thirty_bodies_play_as_smoothly_as_a_page_that_does_nothing(tmp_path: Path, browser: chromium.Browser) -> None:
+    kinds = {"box": (0.1, 0.05, 0.02), "capsule": (0.03, 0.1, 0.0), "sphere": (0.06, 0.0, 0.0)}
+    names = [f"{kind} {i}" for i in range(10) for kind in kinds]
+    bodies = tuple(Body(name=name, mass=1.0, inertia=(0.1, 0.2, 0.3, 0.0, 0.0, 0.0)) for name in names)
+    joints = tuple(Joint(name=name, body=name, type="free") for name in names)
+    shapes = tuple(Shape(name=name, body=name, type=name.split()[0], size=kinds[name.split()[0]]) for name in names)
+    places = [(0.3 * (i % 6), 0.3 * (i // 6), 1.0) for i in range(len(names))]
+    case = from_scene(
+        Scene(bodies=bodies, joints=joints, shapes=shapes), t_end=0.5,
+        q0=[x for place in places for x in (*place, 1.0, 0.0, 0.0, 0.0)],
+        v0=np.tile([0.0, 0.0, 1.0, 2.0, 1.0, 3.0], 30),
+    )  # fmt: skip
+    run = load_engine("reference").prepare(case, "compiled").run()
+    results = [
+        CaseResult(case=case, truth=truth_of(case), entries=(Entry(engine="reference", profile="compiled", run=run),))
+    ]
+    with folder(tmp_path / "out") as made:
+        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
+        site.write(made)
+    (page,) = (tmp_path / "out").glob("case-*.html")
+    browser.open(page)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    still, _ = browser.js(FRAMES)
+    browser.js("document.querySelector('[data-play]').click()")
+    moving, busy = browser.js(FRAMES)
+    print(f"{moving:.0f} frames a second of {still:.0f}, scripts {busy:.1f} ms each")
+    assert moving > 0.9 * still
+
+
 def test_zoom_is_shared_and_keeps_events_sharp(out: Path, browser: chromium.Browser) -> None:
     browser.open(out / CASE)
     draw_all(browser)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,15 +42,31 @@ def pendulum(length: float, above: bool, q0: float, t_end: float = 1.0) -> Case:
     return cases.from_scene(Scene(bodies=(rod,), joints=(joint,)), q0=[q0], t_end=t_end)
 
 
+@pytest.mark.parametrize("start", [1e-5, 1e-8, 0.0])
 @pytest.mark.parametrize("seed", range(4))
-def test_errors_grow_as_the_closed_form_of_an_upright_pendulum_has_it(seed: int) -> None:
-    """q'' = k^2 q: an error dv of the start becomes dv sinh(k T)/k, that of free flight dv T."""
+def test_errors_grow_as_the_closed_form_of_an_upright_pendulum_has_it(seed: int, start: float) -> None:
+    """q'' = k^2 q: an error dv of the start becomes dv sinh(k T)/k, that of free flight dv T, also about a balance."""
     rng = np.random.default_rng(seed)
     length, t_end = rng.uniform(0.3, 1.0), rng.uniform(0.5, 1.5)
     k = np.sqrt(9.81 * length / (length**2 + INERTIA[0]))
-    truth = truth_of(pendulum(length, True, 1e-5, t_end))
+    truth = truth_of(pendulum(length, True, start, t_end))
     assert truth.grows == pytest.approx(np.sinh(k * t_end) / (k * t_end), rel=1e-3)
-    assert truth_of(pendulum(length, False, 1e-5, t_end)).grows == 1.0
+    assert truth_of(pendulum(length, False, start, t_end)).grows == 1.0
+
+
+def test_a_neighbour_that_gets_less_far_tells_of_growth_up_to_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of an upright pendulum's neighbours that are followed to T/2: sinh(k T/2)/(k T)."""
+
+    def halved(case: Case, rtol: float, **settings: Any) -> Trajectory:
+        if "time_limit" not in settings:
+            return motion(case, rtol, **settings)
+        run = motion(replace(case, t_end=0.5 * case.t_end), rtol, samples=settings["samples"][:101])
+        return replace(run, outcome=Outcome.TIME_LIMIT)
+
+    monkeypatch.setattr("crossbody.reports.judging.truth.motion", halved)
+    k, t_end = np.sqrt(9.81 * 0.5 / (0.5**2 + INERTIA[0])), 2.0
+    grows = truth_of(pendulum(0.5, True, 1e-4, t_end)).grows
+    assert grows == pytest.approx(np.sinh(0.5 * k * t_end) / (k * t_end), rel=1e-3)
 
 
 def double_pendulum(angle: float, t_end: float) -> Case:
