@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.core import coulomb, sticking
+from crossbody.reference.core import cones, coulomb, jams, slips, sticking, turning, undetermined
 from crossbody.reference.core.friction import (
     BEGIN,
     BEGIN_SLIP,
@@ -15,6 +15,7 @@ from crossbody.reference.core.friction import (
     MARGIN,
     RENEW,
     RESPOND,
+    SETTLED,
     SOLVE,
     STANDS,
     TURN_PART,
@@ -45,6 +46,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     TURNS_ASIDE     1 if a contact whose slip falls to zero along its direction of reference has one across it there
     BEGIN_SLIP      of contacts that have reached their bounds, there
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
+    SETTLED         follow what the law leaves open, where modes have settled
     """
     if what == FACTOR:
         return float(coulomb.factor(s, m, w, i != 0))
@@ -53,28 +55,32 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == RESPOND:
         coulomb.respond(s, m, w, w.r, w.la)
     elif what == DETERMINANT:
-        return float(coulomb.determinant(s, m, w, w.listed[i]))
+        return float(jams.determinant(s, m, w, w.listed[i]))
     elif what == MARGIN:
-        coulomb.without_pull(s, m, w)
-        return float(coulomb.margin(m, w, i, w.la))
+        cones.without_pull(s, m, w)
+        return float(cones.margin(m, w, i, w.la))
     elif what == WATCH:
-        coulomb.watch_friction(s, m, w, w.cones[i])
+        cones.watch_friction(s, m, w, w.cones[i])
     elif what == TURNING_RATE:
-        return float(coulomb.turning_rate(s, m, w, i != 0))
+        return float(turning.turning_rate(s, m, w, i != 0))
     elif what == TURN_PART:
-        return float(coulomb.turn_part(s, m, w, i))
+        return float(turning.turn_part(s, m, w, i))
     elif what == RENEW:
-        return 1.0 if coulomb.renew(s, m, w, w.rates[0]) else 0.0
+        linger = slips.renew(s, m, w, w.rates[0])
+        undetermined.follow_shares(s, m, w, False)
+        return 1.0 if linger else 0.0
     elif what == TURNS_ASIDE:
-        return 1.0 if coulomb.turns_aside(s, m, w) else 0.0
+        return 1.0 if slips.turns_aside(s, m, w) else 0.0
     elif what == STANDS:
         return 1.0 if slip(m, w, i, w.rate) <= small_slip(s) else 0.0
     elif what == HOLDS_ON:
-        return 1.0 if coulomb.holds_on(s, m, w, i) else 0.0
+        return 1.0 if cones.holds_on(s, m, w, i) else 0.0
     elif what == BEGIN_SLIP:
         sticking.begin_slip(s, m, w)
     elif what == DECIDE:
         return float(sticking.decide(s, m, w))
+    elif what == SETTLED:
+        undetermined.follow_shares(s, m, w, True)
     elif what == BEGIN:
-        coulomb.begin(w)
+        slips.begin(w)
     return 0.0

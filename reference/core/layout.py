@@ -142,6 +142,12 @@ STATE = np.dtype(
         ("sets", "i8"),  # of modes that were tried
         ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters,
         ("determined_until", "f8"),  # s: from then on
+        ("open_t", "f8"),  # up to when that was followed,
+        ("open_way", "f8"),  # by how much it may have moved anything,
+        ("open_for", "f8"),  # s: how long the present share may have done so,
+        ("open_slip", "f8"),  # the fastest slip at its start,
+        ("open_gain", "f8"),  # how fast a share changes any,
+        ("open_lever", "f8"),  # and what of a slip that is beside the coordinates' velocities
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent,
         ("unique_until", "f8"),  # s: and the first of them
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
@@ -351,6 +357,8 @@ class Work:
     left2: Floats  # bounds of sticking rows,
     part2: Floats  # what they bear of them,
     share2: Floats  # and weights by which their loads are shared
+    open_v: Floats  # (n,) by how much velocities may differ for what shares of loads did before,
+    open_rate: Floats  # and accelerations by those of now
     pushed: Floats  # (nc,) right-hand sides less what forces of rows do that slide with a bound of their own
 
 
@@ -368,7 +376,8 @@ def workspace(
         **dict.fromkeys(("y", "y1", "ys", "atol"), (ny,)), "k": (DENSE_STAGES, ny), "F": (DENSE_TERMS, ny),
         "tangent": (turns * nq, n), "stage_v": (6 * turns, n), "bend": (2 * turns, nq),
         **dict.fromkeys(("place", "turn"), (turns * nq,)),
-        "slip": (turns * n,), "travel": (max(turns, frictional) * n,),
+        **dict.fromkeys(("open_v", "open_rate"), (frictional * n,)), "slip": (turns * n,),
+        "travel": (max(turns, frictional) * n,),
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),

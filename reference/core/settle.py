@@ -10,7 +10,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.collisions import collide
-from crossbody.reference.core.friction import BEGIN, DECIDE, NOTHING, ask, has_friction
+from crossbody.reference.core.friction import BEGIN, DECIDE, NOTHING, SETTLED, ask, has_friction
 from crossbody.reference.core.holding import MOVED, doubtful, hold
 from crossbody.reference.core.journal import change, keep_discrete, move, remember, write_discrete
 from crossbody.reference.core.layout import (
@@ -255,5 +255,8 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         code = _iterate(K, s, m, w, b)
     w.spent[:] = 0
     _keep(w)
+    if s.frictional and code == 0:
+        code = evaluate(K, s, m, w, b.mode)
+        ask(SETTLED, s, m, w, NOTHING)
     begin_watch(K, s, m, w)
     return int(code)

@@ -40,10 +40,11 @@ def check_analytic(system: System, t: float, q: Floats, v: Floats, u: Floats) ->
         return _terms(system, t, *np.split(x, sizes))
 
     here, stepped = at(x), at(x + 1j * STEP * d)
+    rounded = float(np.abs(here["H"]).max(initial=0.0) * (1.0 + np.abs(v).max(initial=0.0)) ** 2)
     for name in here:
-        exact = stepped[name].imag / STEP
+        exact, floor = stepped[name].imag / STEP, rounded if name == "Hdv" else 0.0  # products of v that may cancel
         with np.errstate(all="ignore"):  # a state so far out that sums overflow tells nothing
-            wrong = _differs(lambda x, name=name: at(x)[name], x, d, exact, here[name])  # type: ignore[misc]
+            wrong = _differs(lambda x, name=name: at(x)[name], x, d, exact, here[name], floor)  # type: ignore[misc]
         if np.any(wrong):
             first = tuple(np.argwhere(wrong)[0])
             slope = (at(x + WIDTHS[-1] * d)[name] - at(x - WIDTHS[-1] * d)[name]) / (2.0 * WIDTHS[-1])
@@ -65,14 +66,14 @@ def _terms(system: System, t: float, q: Array, v: Array, u: Array) -> dict[str, 
     return {"M": M, "f": f, "H": H, "h": h, "Hdv": Hdv}
 
 
-def _differs(function: Callable[[Any], Any], x: Floats, d: Floats, exact: Any, here: Any) -> Any:
-    """Whether no real difference along d comes near the complex step."""
+def _differs(function: Callable[[Any], Any], x: Floats, d: Floats, exact: Any, here: Any, floor: float) -> Any:
+    """Whether no real difference along d comes near the complex step; terms as large as floor may have cancelled."""
     wrong, last = np.ones(np.shape(exact), dtype=bool), np.full(np.shape(exact), np.inf)
     for width in WIDTHS:
         ahead, behind = function(x + width * d), function(x - width * d)
         middle = (ahead - behind) / (2.0 * width)
         largest = np.max(
-            np.abs([here, ahead, behind]), initial=0.0
+            np.abs([here, ahead, behind]), initial=floor
         )  # terms that cancel in an entry leave their rounding
         spread = np.abs(ahead - 2.0 * here + behind) / width if width == WIDTHS[0] else np.abs(middle - last)
         noise = 64.0 * np.finfo(float).eps * largest / width

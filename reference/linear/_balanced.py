@@ -12,7 +12,8 @@ from crossbody.cases.arrays import frozen, full
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
-from crossbody.reference.linear._derivatives import STEP, Point, dense, residual, terms
+from crossbody.reference.linear._derivatives import residual
+from crossbody.reference.linear._point import STEP, Point, dense, terms
 from crossbody.reference.linear._unmeasured import LARGEST, Estimate, Record, Unknown, input_columns
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.linalg import null_space
 
 from crossbody.reference.kinds import Floats, Index
-from crossbody.reference.linear._derivatives import STEP, Point, dense, residual, terms
+from crossbody.reference.linear._derivatives import residual
+from crossbody.reference.linear._point import STEP, Point, dense, terms
 from crossbody.reference.linear._unmeasured import Estimate, Record, input_columns
 
 TERMS, REACH = 12, 0.5

@@ -17,8 +17,8 @@ from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear import _compiled
-from crossbody.reference.linear._derivatives import Point, check_coordinates
 from crossbody.reference.linear._pattern import Pattern, coloured, dense, observed
+from crossbody.reference.linear._point import Point, check_coordinates
 from crossbody.reference.linear.linearisation import point
 
 CHUNKS = 8  # parts a thread takes

@@ -8,7 +8,8 @@ import numpy as np
 
 from crossbody.cases.arrays import Bytes
 from crossbody.reference.kinds import Floats, Index
-from crossbody.reference.linear._derivatives import STEP, Point, residual
+from crossbody.reference.linear._derivatives import residual
+from crossbody.reference.linear._point import STEP, Point
 
 SEED = 20
 LOOKS = 2  # points at which the pattern is looked for

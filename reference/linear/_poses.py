@@ -14,9 +14,9 @@ from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear import _held
 from crossbody.reference.linear._compiled import FOUND, ILL_POSED, MISSED
-from crossbody.reference.linear._derivatives import Point
 from crossbody.reference.linear._many import first, shared, states
 from crossbody.reference.linear._pattern import Pattern, coloured, dense, observed
+from crossbody.reference.linear._point import Point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Any
@@ -10,27 +10,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
+from scipy.linalg import block_diag
 
 from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
-from crossbody.reference.linear._derivatives import Point, turning
+from crossbody.reference.linear._point import NO_ROWS, Point, directions, rubbing, turning
+from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, Slipping
+from crossbody.reference.linear._slipping import AS_ONE as SWITCH_AS_ONE
 from crossbody.reference.linear._variation import (
     Theta,
     bounced,
+    flow,
     gap_gradient,
     gradient,
     handover_gradient,
     lam_gradient,
     rate_slopes,
-    slopes,
+    rates,
+    slips,
     theta,
 )
 from crossbody.reference.linear.linearisation import point
 
-ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
 GRAZING = 1e-12  # part of the terms of g_x f below which an event is only grazed
 
 
@@ -72,6 +76,7 @@ class Sensitivity:
         names: of the parameters.
         jumps: the events that were passed.
         outcome: that of the run; ILL_POSED if an event is only grazed, where the derivative does not exist.
+        message: that of the run, or what is grazed, and when.
     """
 
     run: Trajectory
@@ -81,6 +86,7 @@ class Sensitivity:
     names: tuple[str, ...]
     jumps: tuple[Jump, ...]
     outcome: Outcome
+    message: str = ""
 
     @property
     def multipliers(self) -> Array:
@@ -99,19 +105,24 @@ def sensitivity(
     Collisions that follow one another at one instant, as through balls that touch, are passed one by one: the
     derivative is then that of deviations that part the balls, as long as those do not meet again.
 
+    A slip that stops takes the deviations of its velocity with it. Where a contact sticks from the start or from its
+    touch, so do those by which it would slip: they die out within times of their own size.
+
     Args:
         system: the mechanism, without a sampled controller.
         q0: positions at the start (nq,).
         v0: velocities at the start (n,).
         t_end: horizon, s.
-        parameters: by name, "p[k]", or "a0[i]", "a1[i]", "a2[i]" of row i's slow law.
+        parameters: by name, "p[k]", "a0[i]", "a1[i]", "a2[i]" of row i's slow law, "mu[i]" of the friction of contact i
+            or the bound of row i's own, "drift[i]" of the surface along tangential row i.
         u: constant inputs (nu,), zero if not given.
         rtol: tolerance of the motion and of its derivatives.
         collisions: rule for several contacts; under "simultaneous" one collision at a time only.
         max_steps: bound on the steps of the motion.
 
     Raises:
-        SceneError: for a sampled controller, a motion that switches discrete variables, or rows that strike as one.
+        SceneError: for a sampled controller, a motion that switches discrete variables, rows that strike or switch as
+            one, a slip in space that turns back through zero, or a load of which the law leaves open who bears it.
         UnknownName: for a parameter that is not there.
     """
     over, at = theta(system, parameters), point(system, q0, v0, u, [], 0.0)
@@ -122,7 +133,7 @@ def sensitivity(
     )
     if any(switch.t > 0.0 and not switch.smooth for switch in run.switches):
         raise SceneError("sensitivity: the motion switches discrete variables; end it before the first switch.")
-    walk = _Walk(at, over, rtol)
+    walk = _Walk(at, over, rtol, run)
     outcome, n, nq = walk.along(run, t_end) if run.outcome.ok else run.outcome, system.n, system.nq
     if not outcome.ok:
         walk.S[:] = np.nan
@@ -130,8 +141,14 @@ def sensitivity(
         raise SceneError(AS_ONE)  # touching rows share an impulse of which one event tells
     return Sensitivity(
         run=run, state=walk.x, by_start=walk.S[:, : 2 * n], by_parameters=walk.S[:, 2 * n :], names=over.names,
-        jumps=tuple(walk.jumps), outcome=outcome,
+        jumps=tuple(walk.jumps), outcome=outcome, message=walk.message or run.message,
     )  # fmt: skip
+
+
+def _placed(here: Point, t: float, y: Floats) -> Point:
+    """The point at a time and a state."""
+    nq = here.system.nq
+    return replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + here.system.n].copy())
 
 
 def _same(end: Floats, motion: Floats) -> bool:
@@ -142,65 +159,154 @@ def _same(end: Floats, motion: Floats) -> bool:
 class _Walk:
     """State x (nq + n,) and its derivative S (2 n, 2 n + k) on the way through a motion."""
 
-    def __init__(self, at: Point, over: Theta, rtol: float) -> None:
-        n = at.system.n
-        self.at, self.over, self.rtol = at, over, rtol
+    def __init__(self, at: Point, over: Theta, rtol: float, run: Trajectory) -> None:
+        system, n = at.system, at.system.n
+        self.at, self.over, self.rtol, self.run = at, over, rtol, run
         self.x = np.concatenate([at.q, at.v])
         self.S = np.hstack([np.eye(2 * n), np.zeros((2 * n, len(over.names)))])
-        self.modes = initial_modes(at.system, at.q, at.v).astype(int).tolist()
+        self.modes = initial_modes(system, at.q, at.v).astype(int).tolist()
         self.jumps: list[Jump] = []
+        self.message = ""
+        states = [(q.copy(), v.copy(), i) for q, v in zip(run.q, run.v, strict=True) for i in rubbing(system).values()]
+        speed = max((float(np.linalg.norm(slips(at, *state))) for state in states), default=0.0)
+        self.slipping = Slipping(system=system, over=over, run=run, place=_placed, speed=speed or 1.0)
 
     def along(self, run: Trajectory, t_end: float) -> Outcome:
         """Go to the end; FINISHED, or how the derivative was lost."""
-        now = 0.0
+        now, rubs = 0.0, self.at.system.frictional
+        if rubs and not (run.events and run.events[0].t == 0.0):
+            self.slipping.hold(self._here(0.0), self.S)
         for t, group in groupby(run.events, key=lambda event: event.t):
-            self._smooth(now, t)
-            now = t
-            for piece in _pieces(list(group)):
-                if not self._event(piece):
+            if not self._smooth(now, t):
+                return Outcome.ILL_POSED
+            now, events = t, list(group)
+            for piece in [events] if rubs else _pieces(events):
+                if not (self._switch(piece) if rubs else self._event(piece)):
+                    self.message = f"The event of row {piece[0].contact} at t = {t:.9g} s is only grazed."
                     return Outcome.ILL_POSED
-        self._smooth(now, t_end)
+        if not self._smooth(now, t_end):
+            return Outcome.ILL_POSED
         return Outcome.FINISHED if np.isfinite(self.S).all() else Outcome.NOT_FINITE
 
-    def _here(self) -> Point:
-        """The present state, with the rows and constants of the present modes."""
+    def _here(self, t: float, side: str = "right") -> Point:
+        """The state at t with the rows and constants of the present modes; slips as the motion has them beside it."""
         system, nq = self.at.system, self.at.system.nq
         modes = [self.modes[f] if f >= 0 else m for m, f in zip(self.modes, np.asarray(system.follows), strict=True)]
         fast = (np.array(modes) == Mode.COLLISION) & (np.asarray(system.b0) > 0.0)
-        return replace(
-            self.at, q=self.x[:nq].copy(), v=self.x[nq:].copy(),
-            alpha=np.where(fast[:, None], system.beta, system.alpha),
+        at = replace(
+            self.at, q=self.x[:nq].copy(), v=self.x[nq:].copy(), t=t,
+            alpha=np.where(fast[:, None], system.beta, system.alpha), idle=NO_ROWS, sharing=NO_ROWS,
             active=np.array([i for i, mode in enumerate(modes) if mode in ACTIVE], dtype=np.int64),
         )  # fmt: skip
+        return self.slipping.directed(at, modes, self._sample(t, side)) if system.frictional else at
 
-    def _smooth(self, start: float, end: float) -> None:
-        """Integrate x and S between two events."""
-        if not end > start:
-            return
-        here, system = self._here(), self.at.system
-        n, nq, shape = system.n, system.nq, self.S.shape
+    def _sample(self, t: float, side: str) -> int:
+        """The last sample before an event at t, or the first one behind it."""
+        return int(
+            np.searchsorted(self.run.t, t, "left") if side == "left" else np.searchsorted(self.run.t, t, "right") - 1
+        )
+
+    def _smooth(self, start: float, end: float) -> bool:
+        """Integrate x and S between two events; False if one more is grazed on the way.
+
+        A slip in space that begins turns at any rate, so that it takes an implicit method.
+        """
+        while end > start:
+            here = self._here(start)
+            ends, stiff = self.slipping.turns(here)
+            watched = self.slipping.watches(here)
+            y = np.concatenate([self.x, self.S.ravel()])
+            size = np.concatenate([np.ones(len(self.x)), np.full(self.S.size, np.abs(self.S).max())])
+            how: Any = {"method": "Radau", "jac": self._jacobian(here)} if stiff else {"method": "DOP853"}
+            done: Any = solve_ivp(
+                self._rate(here), (start, end), y, rtol=self.rtol, atol=1e-3 * self.rtol * size,
+                events=[*(slope for _, slope in watched), *ends], **how,
+            )  # fmt: skip
+            if done.status < 0:
+                self.message = f"The derivative was lost at t = {done.t[-1]:.9g} s: {done.message}"
+                return False
+            for (left, _), times, states in zip(watched, done.t_events or (), done.y_events or (), strict=False):
+                for t, state in zip(times, states, strict=True):
+                    if t - start > EDGE * (end - start) and not left(_placed(here, t, state)) > GRAZED:
+                        self.message = f"An event of a contact with friction is grazed at t = {t:.9g} s."
+                        return False
+            width, start = len(self.x), float(done.t[-1])
+            self.x, self.S = done.y[:width, -1].copy(), done.y[width:, -1].reshape(self.S.shape).copy()
+            self.x[: self.at.system.nq] = self.at.system.normalised("sensitivity", self.x[: self.at.system.nq])
+        return True
+
+    def _rate(self, here: Point) -> Callable[[float, Floats], Floats]:
+        """The right-hand side of x and S."""
+        system, shape = self.at.system, self.S.shape
+        n, nq = system.n, system.nq
 
         def rate(t: float, y: Floats) -> Floats:
-            moved = replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + n].copy())
-            f, _, slope = slopes(moved, self.over)
+            moved = _placed(here, t, y)
+            f, slope = flow(moved, self.over)
             S = y[nq + n :].reshape(shape)
             tangent = S[n:]
             if system.velocity is not None:
                 tangent = tangent + turning(system, t, moved.q, moved.v) @ S[:n]
                 tangent[:, 2 * n :] += rate_slopes(moved, self.over)
-            changed = slope[:n, : 2 * n] @ S
-            changed[:, 2 * n :] += slope[:n, 2 * n :]
+            changed = slope[:, : 2 * n] @ S
+            changed[:, 2 * n :] += slope[:, 2 * n :]
             return np.concatenate([system.rates(moved.q, moved.v, t), f[n:], tangent.ravel(), changed.ravel()])
 
-        y = np.concatenate([self.x, self.S.ravel()])
-        scale = np.full(len(y), 1e-3)
-        done: Any = solve_ivp(rate, (start, end), y, method="DOP853", rtol=self.rtol, atol=self.rtol * scale)
-        self.x, self.S = done.y[: nq + n, -1].copy(), done.y[nq + n :, -1].reshape(shape).copy()
-        self.x[:nq] = system.normalised("sensitivity", self.x[:nq])
+        return rate
+
+    def _jacobian(self, here: Point) -> Callable[[float, Floats], Floats]:
+        """Of the right-hand side, but for second derivatives: Newton's method finds its way without."""
+        system, n, nq = self.at.system, self.at.system.n, self.at.system.nq
+
+        def jacobian(t: float, y: Floats) -> Floats:
+            moved = _placed(here, t, y)
+            vd_x, N = flow(moved, self.over)[1][:, : 2 * n], directions(system, moved.q)
+            whole = np.block([[turning(system, t, moved.q, moved.v), np.eye(n)], [vd_x]])
+            own = np.block([[np.zeros((nq, nq)), N], [vd_x[:, :n] @ np.linalg.pinv(N), vd_x[:, n:]]])
+            return np.asarray(block_diag(own, np.kron(whole, np.eye(self.S.shape[1]))), dtype=np.float64)
+
+        return jacobian
+
+    def _switch(self, group: list[Event]) -> bool:
+        """Pass all events of one instant: what fell to zero, and what follows from it; False if it is only grazed."""
+        t, width, changes = group[0].t, 2 * self.at.system.n, list[Floats]()
+        old = np.zeros(width)
+        if t > 0.0:
+            before, k = self._here(t, "left"), self._sample(t, "left")
+            old, firsts = rates(before), {e.contact: e for e in reversed(group)}
+            changes = [g for e in firsts.values() for g in [self.slipping.reached(e, before, k)] if g is not None]
+        for e in group:
+            self.modes[e.contact] = int(e.after)
+        after = self._here(t)
+        if t > 0.0:
+            shifts = [self._shift(g, old) for g in changes]
+            known = [shift for shift in shifts if shift is not None]
+            if len(known) < len(shifts):
+                return False
+            new, R = rates(after), np.eye(width, self.S.shape[1])
+            smooth = np.abs(new - old).max() <= ALIKE * np.abs(old).max()  # a label alone, as of what is free again
+            if any(np.abs(s - known[0]).max() > ALIKE * np.abs(s).max() for s in known[1:]) or not (known or smooth):
+                raise SceneError(SWITCH_AS_ONE.format(t=t))
+            if known:
+                self._jump(group, changes[0], R, old, new)
+        self.slipping.hold(after, self.S)
+        return True
+
+    def _shift(self, g: Floats, old: Floats) -> Floats | None:
+        """By how much an event moves in time with every variable; None if it is only grazed."""
+        width = len(old)
+        speed = float(g[:width] @ old)
+        if not abs(speed) > GRAZING * float(np.abs(g[:width]) @ np.abs(old)):
+            return None
+        change = g[:width] @ self.S
+        change[width:] += g[width:]
+        shift: Floats = -change / speed
+        return shift
 
     def _event(self, piece: list[Event]) -> bool:
         """Pass one event, or one frozen collision with all that it does; False if it is only grazed."""
-        event, before = piece[0], self._here()
+        event = piece[0]
+        before = self._here(event.t, "left")
         frozen = len(piece) > 1
         start, n = event.t == 0.0 and not frozen, self.at.system.n
         R, jumped = np.eye(2 * n, self.S.shape[1]), self.x
@@ -212,27 +318,24 @@ class _Walk:
             R = np.vstack([R[:n], gradient(after, struck, self.over)])
             jumped = np.concatenate([struck.q, after(struck, struck.q, struck.v)])
         guard = None if start else self._guard(event, before)
-        old, _, _ = slopes(before, self.over)
+        old = rates(before)
         for e in piece:
             self.modes[e.contact] = int(e.after)
         self.x = jumped
         if guard is None:
             return True
-        new, _, _ = slopes(self._here(), self.over)
+        new = rates(self._here(event.t))
         return self._jump(piece, guard, R, old, new)
 
     def _jump(self, piece: list[Event], g: Floats, R: Floats, old: Floats, new: Floats) -> bool:
-        width = len(old)
-        speed = float(g[:width] @ old)
-        if not abs(speed) > GRAZING * float(np.abs(g[:width]) @ np.abs(old)):
+        width, shift = len(old), self._shift(g, old)
+        if shift is None:
             return False
         kick = R[:, :width] @ old - new
-        change = g[:width] @ self.S
-        change[width:] += g[width:]
-        S = R[:, :width] @ self.S - np.outer(kick, change) / speed
+        S = R[:, :width] @ self.S + np.outer(kick, shift)
         S[:, width:] += R[:, width:]
         self.S = S
-        matrix = R[:, :width] - np.outer(kick, g[:width]) / speed
+        matrix = R[:, :width] - np.outer(kick, g[:width]) / float(g[:width] @ old)
         self.jumps.append(
             Jump(t=piece[0].t, contact=piece[0].contact, before=piece[0].before, after=piece[-1].after, matrix=matrix)
         )

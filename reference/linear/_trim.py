@@ -13,7 +13,8 @@ from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._indices import different
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats, Index
-from crossbody.reference.linear._derivatives import STEP, Point, directions, terms
+from crossbody.reference.linear._point import STEP, Point, directions, terms
+from crossbody.reference.linear._rubbing import borne, check_slips
 from crossbody.reference.linear.linearisation import point
 
 STEPS = 50
@@ -47,13 +48,14 @@ class Trim:
 @checked_arguments
 def trim(
     system: System, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None,
-    active: Sequence[int] | None = None, *, free: Sequence[int] | None = None, rates: Sequence[int] = (),
-    inputs: Sequence[int] = (), t: float = 0.0,
+    active: Sequence[int] | None = None, *, sliding: Sequence[int] = (), free: Sequence[int] | None = None,
+    rates: Sequence[int] = (), inputs: Sequence[int] = (), t: float = 0.0,
 ) -> Trim:  # fmt: skip
     """Solve f(q, v, u) + H_A^T lam = 0 with h_A = 0 and H_A v = 0 by the damped method of Gauss and Newton.
 
     Steps are the smallest that satisfy the linearised equations, so what they leave open stays as given. A row without
-    stiffness (a0 = a2 = 0, a slip row) has no h of its own.
+    stiffness (a0 = a2 = 0, a slip row) has no h of its own. Contacts that slide push by mu lam_n against their
+    velocity; whether those that stick can bear what they must, `linearise` says.
 
     Args:
         system: the mechanism.
@@ -61,23 +63,24 @@ def trim(
         v: velocities (n,), zero if not given.
         u: inputs (nu,), zero if not given.
         active: rows that are on; those that are always on, if not given.
+        sliding: which of these slide, as in `linearise`.
         free: coordinates that may move, of the tangent space where q' is not v; all of them if not given.
         rates: velocities that may change: of cyclic coordinates, which nothing depends on.
         inputs: inputs that may change.
         t: time, s.
 
     Raises:
-        SceneError: for arrays of another shape, or rows that do not exist.
+        SceneError: for arrays of another shape, rows that do not exist, or a contact that slides at no speed.
     """
-    at = point(system, q, v, u, active, t)
-    n, nu, na = system.n, system.inputs, len(at.active)
+    at = point(system, q, v, u, active, t, sliding=sliding)
+    n, nu, na = system.n, system.inputs, len(at.solved)
     places = different("trim.free", range(n) if free is None else free, n)
     moved = [places, n + different("trim.rates", rates, n), 2 * n + different("trim.inputs", inputs, nu)]
     unknown = np.concatenate([*moved, np.arange(2 * n + nu, 2 * n + nu + na)])
     x = np.concatenate([at.q if system.velocity is None else np.zeros(n), at.v, at.u, np.zeros(na)])
     x[2 * n + nu :] = _multipliers(at, x)
     at, outcome, left, force = _solved(at, x, unknown)
-    lam = x[2 * n + nu :]
+    lam = borne(at, terms(at, at.q, x[n : 2 * n], at.u)[2], x[n : 2 * n], x[2 * n + nu :])
     pulls = (
         (lam < -1e3 * SETTLED * force)
         & np.asarray(system.unilateral, dtype=bool)[at.active]
@@ -114,12 +117,13 @@ def _balance(at: Point, x: Array) -> tuple[Array, Floats]:
     d, v, u, lam = np.split(x, [n, 2 * n, 2 * n + nu])
     q = _placed(at, d)
     _, f, H, h, _ = terms(at, q, v, u)
-    a0, _, a2 = at.system.alpha[at.active].T
+    every, rates = borne(at, H, v, lam), (H @ v - at.given("drift")[at.active])[at.solved]
+    a0, _, a2 = at.system.alpha[at.active[at.solved]].T
     stiff = (a0 > 0.0) | (a2 > 0.0)
-    forces = np.abs(f) + np.abs(lam) @ np.abs(H)
+    forces = np.abs(f) + np.abs(every) @ np.abs(H)
     sizes = [np.full(n, forces.max(initial=0.0) or 1.0), np.full(int(stiff.sum()), np.abs(q).max(initial=1e-6))]
     sizes.append(np.full(len(lam), np.abs(v).max(initial=1e-6)))
-    return np.concatenate([f + lam @ H, h[stiff], H @ v]), np.concatenate(sizes).real
+    return np.concatenate([f + every @ H, h[at.solved][stiff], rates]), np.concatenate(sizes).real
 
 
 def _multipliers(at: Point, x: Floats) -> Floats:
@@ -128,8 +132,11 @@ def _multipliers(at: Point, x: Floats) -> Floats:
     d, v, u = np.split(x[: 2 * n + at.system.inputs], [n, 2 * n])
     _, f, H, _, _ = terms(at, _placed(at, d), v, u)
     if not (np.isfinite(f).all() and np.isfinite(H).all()):
-        return np.zeros(len(H))
-    return np.asarray(np.linalg.lstsq(H.T, -f, rcond=None)[0], dtype=np.float64)
+        return np.zeros(len(at.solved))
+    check_slips(replace(at, v=v), H)
+    rubbed = borne(at, H, v, np.zeros(len(at.solved)))
+    pushed = H.T @ (borne(at, H, v, np.eye(len(at.solved))) - rubbed[:, None])
+    return np.asarray(np.linalg.lstsq(pushed, -f - rubbed @ H, rcond=None)[0], dtype=np.float64)
 
 
 def _recentred(at: Point, x: Floats) -> Point:

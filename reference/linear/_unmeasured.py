@@ -18,7 +18,7 @@ from crossbody.cases.entry_points import wholes
 from crossbody.reference._indices import different
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats, Index
-from crossbody.reference.linear._derivatives import STEP, Point, check_coordinates, terms
+from crossbody.reference.linear._point import STEP, Point, check_coordinates, terms
 
 LARGEST = 1e100  # of a deviation: its square is still a number
 

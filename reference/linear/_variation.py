@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from crossbody.cases import UnknownName
 from crossbody.cases.closed_forms import damping_ratio, restitution
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats
-from crossbody.reference.linear._derivatives import STEP, Point, dense, directions, gaps, residual, saddle, terms
+from crossbody.reference.linear._derivatives import implied, residual, saddle
+from crossbody.reference.linear._point import STEP, Point, dense, directions, gaps, rubbing, terms
+from crossbody.reference.linear._rubbing import borne, loads
 
 HANDOVER = 0.01
 """Elastic part of lam at which COLLISION becomes CONTACT (spec 1.2)."""
@@ -26,40 +29,44 @@ HANDOVER = 0.01
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Theta:
-    """Parameters that a motion is differentiated by: places in p, or (row, column) of the law."""
+    """Parameters that a motion is differentiated by: of which field of a `Point`, and where in it."""
 
     names: tuple[str, ...]
-    places: tuple[int | tuple[int, int], ...]
+    places: tuple[tuple[str, int | tuple[int, int]], ...]
 
     def moved(self, at: Point, k: int) -> Point:
         """The point with an imaginary step in parameter k."""
-        place = self.places[k]
-        if isinstance(place, int):
-            p = (at.system.p if at.p is None else at.p).astype(complex)
-            p[place] += 1j * STEP
-            return replace(at, p=p)
-        alpha = (at.system.alpha if at.alpha is None else at.alpha).astype(complex)
-        alpha[place] += 1j * STEP
-        return replace(at, alpha=alpha)
+        name, place = self.places[k]
+        moved = at.given(name).astype(complex)
+        moved[place] += 1j * STEP
+        changed: dict[str, Any] = {name: moved}
+        return replace(at, **changed)
 
 
 def theta(system: System, names: Sequence[str]) -> Theta:
-    """Find parameters by name: those of the system, p[3], or a0[0], a1[0], a2[0] of row 0's law.
+    """Find parameters by name: those of the system, p[3], a0[0], a1[0], a2[0] of row 0's law, mu[0] of its friction.
 
     Raises:
         UnknownName: for one that is not there.
     """
     own = list(system.parameters) if isinstance(system.parameters, Mapping) else []
-    places: list[int | tuple[int, int]] = []
+    places: list[tuple[str, int | tuple[int, int]]] = []
     for name in names:
-        part = re.fullmatch(r"(p|a0|a1|a2)\[(\d+)\]", name)
-        size = 0 if part is None else len(system.p) if part[1] == "p" else system.nc
+        part = re.fullmatch(r"(p|a0|a1|a2|mu|drift)\[(\d+)\]", name)
+        field, i = ("", 0) if part is None else (part[1], int(part[2]))
         if name in own:
-            places.append(own.index(name))
-        elif part is not None and int(part[2]) < size:
-            places.append(int(part[2]) if part[1] == "p" else (int(part[2]), int(part[1][1])))
+            places.append(("p", own.index(name)))
+        elif field == "p" and i < len(system.p):
+            places.append(("p", i))
+        elif field in ("a0", "a1", "a2") and i < system.nc:
+            places.append(("alpha", (i, int(field[1]))))
+        elif field == "mu" and i < system.nc and system.tangents[i] > 0:
+            places.append(("friction", i))
+        elif field == "drift" and i < system.nc and i in rubbing(system):
+            places.append(("drift", i))
         else:
-            raise UnknownName("parameter of the sensitivity", name, [*own, "p[k]", "a0[i]", "a1[i]", "a2[i]"])
+            valid = [*own, "p[k]", "a0[i]", "a1[i]", "a2[i]", "mu[i]", "drift[i]"]
+            raise UnknownName("parameter of the sensitivity", name, valid)
     return Theta(names=tuple(names), places=tuple(places))
 
 
@@ -75,6 +82,23 @@ def gradient(function: Callable[[Point, Array, Array], Array], at: Point, over: 
     return np.stack(columns, axis=-1)
 
 
+def rates(at: Point) -> Floats:
+    """Rates (v, v') (2 n,)."""
+    return np.concatenate([at.v, saddle(at)[1]])
+
+
+def flow(at: Point, over: Theta) -> tuple[Floats, Floats]:
+    """Rates (v, v') (2 n,), and the derivative of v' by (dq, v, theta).
+
+    Raises:
+        SceneError: as `slopes`.
+    """
+    K, vd, lam = saddle(at)
+    columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
+    solved = np.asarray(np.linalg.solve(K, columns[: len(K)]), dtype=np.float64)
+    return np.concatenate([at.v, vd]), -solved[: at.system.n]
+
+
 def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
     """Rates (v, v') (2 n,), multipliers (na,), and the derivatives of (v', lam) by (dq, v, theta).
 
@@ -83,7 +107,9 @@ def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
     """
     K, vd, lam = saddle(at)
     columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
-    return np.concatenate([at.v, vd]), lam, -np.asarray(np.linalg.solve(K, columns), dtype=np.float64)
+    bearing = gradient(lambda here, q, v: loads(here, q, v, at.u, lam), at, over)
+    every = borne(at, terms(at, at.q, at.v, at.u)[2], at.v, lam)
+    return np.concatenate([at.v, vd]), every, np.vstack(implied(at, K, columns, bearing))
 
 
 def rate_slopes(at: Point, over: Theta) -> Floats:
@@ -91,7 +117,7 @@ def rate_slopes(at: Point, over: Theta) -> Floats:
     system, columns = at.system, [np.zeros(at.system.nq)]
     for k in range(len(over.places)):
         p, out = over.moved(at, k).p, np.zeros(system.nq, complex)
-        if p is not None:  # else it is one of the law
+        if p is not None:  # else it is none that the kernel reads
             system.velocity(at.t, at.q.astype(complex), at.v.astype(complex), p, out)
         columns.append(out.imag / STEP)
     found = np.linalg.lstsq(directions(system, at.q), np.stack(columns, axis=-1), rcond=None)[0]
@@ -102,6 +128,31 @@ def gap_gradient(at: Point, over: Theta, i: int, *, rate: bool = False) -> Float
     """Of gap i, or of its rate."""
     place = i + at.system.nc * rate
     return gradient(lambda here, q, v: gaps(here, q, v)[place], at, over)
+
+
+def slips(at: Point, q: Array, v: Array, i: int) -> Array:
+    """Slip velocity (1,) or (2,) of contact i."""
+    rows = int(at.system.tangent[i]) + np.arange(int(at.system.tangents[i]))
+    found: Array = gaps(at, q, v)[at.system.nc + rows] - at.given("drift")[rows]
+    return found
+
+
+def slip_gradient(at: Point, over: Theta, i: int) -> Floats:
+    """Of the slip velocity of contact i (1 or 2, ...)."""
+    return gradient(lambda here, q, v: slips(here, q, v, i), at, over)
+
+
+def cone_gradient(at: Point, over: Theta, i: int) -> tuple[float, Floats, float]:
+    """By how much contact i, which sticks, is below its bound: value, gradient, and the bound."""
+    _, lam, slope = slopes(at, over)
+    n, places, mu = at.system.n, at.tangents(i), at.system.friction[i]
+    changed = gradient(lambda here, q, v: here.given("friction")[i : i + 1], at, over)[0]
+    size, lam_x = float(np.linalg.norm(lam[places])), slope[n:]
+    rate = lam[places] @ lam_x[places] / size if size > 0.0 else np.zeros(lam_x.shape[1])
+    if at.system.dry[i]:
+        return float(mu) - size, changed - rate, float(mu)
+    j = at.active.tolist().index(i)
+    return float(mu * lam[j]) - size, mu * lam_x[j] + lam[j] * changed - rate, float(mu * lam[j])
 
 
 def lam_gradient(at: Point, over: Theta, i: int) -> Floats:

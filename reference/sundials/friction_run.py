@@ -14,7 +14,8 @@ from crossbody.reference.sundials import roots
 from crossbody.reference.sundials.arcs import CHUNK, FAR, ORDER, ORDER_IN_CONTACT, SHARE, Fired, State
 from crossbody.reference.sundials.dense import DenseStep
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
-from crossbody.reference.sundials.friction_machine import Alarm, FrictionMachine
+from crossbody.reference.sundials.friction_alarms import Alarm, values
+from crossbody.reference.sundials.friction_machine import FrictionMachine
 from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachine, View
 from crossbody.reference.sundials.run import CAUTION, SundialsRun
 
@@ -90,8 +91,8 @@ class SlidingArc(DenseStep):
         if not any(rate > self._pole() for _, rate in self.turning.values()):
             return False
         s = self.at(self.t1)
-        now = self.run.friction.turning(s.t, s.q, s.v)
-        return any(i in now and now[i][0] > 2.0 * size for i, (size, _) in self.turning.items())
+        now = self.run.friction.slips(s.t, s.q, s.v)
+        return any(now[i] > 2.0 * size for i, (size, _) in self.turning.items())
 
     def step(self, stop: float, target: float) -> tuple[State, Fired]:
         """Go on by one step, or to the first alarm inside it."""
@@ -115,28 +116,27 @@ class SlidingArc(DenseStep):
 
     def _search(self) -> tuple[float, list[Alarm]]:
         """The first instant of the step at which alarms fire, and these; its end if none does."""
-        machine, known = self.run.friction, dict[float, Floats]()
+        machine = self.run.friction
         if not machine.alarms:
             return self.t1, []
 
-        def terms(t: float) -> Floats:
-            if t not in known:
-                y = self._between(t)
-                known[t] = machine.values(t, y[: self.nq], y[self.nq : self.ny])
-            return known[t]
+        def evaluated(times: list[float]) -> Floats:
+            y = np.array([self._between(t) for t in times])
+            return values(machine, times, y[:, : self.nq], y[:, self.nq : self.ny])
 
+        terms = roots.Together(evaluated)
         above = roots.stay_above(terms, self.t0, self.t1)
         end, found = self.t1, list[tuple[float, Alarm]]()
         for alarm in machine.alarms:
             if above[alarm.terms].any():
                 continue
 
-            def its_own(t: float, alarm: Alarm = alarm) -> Floats:
-                return terms(t)[alarm.terms]
+            def own(times: list[float], alarm: Alarm = alarm) -> Floats:
+                return np.array([found[alarm.terms] for found in terms.at(times)])
 
             precision = max(64.0 * ULP, SHARE * self.run.options.rtol)
             none = np.zeros(alarm.terms.stop - alarm.terms.start)
-            t = roots.first(its_own, self.t0, end, precision, none, alarm.armed)
+            t = roots.first(roots.Together(own), self.t0, end, precision, none, alarm.armed)
             if t is not None:
                 t = self._stop(alarm, terms, t) if alarm.tells == "STOP" else t
                 end = min(t, end)
@@ -145,7 +145,7 @@ class SlidingArc(DenseStep):
 
     def _stop(self, alarm: Alarm, terms: roots.Terms, t: float) -> float:
         """Where a slip that passes zero by more than one may is at zero itself."""
-        over = self.run.friction._leave(alarm.row)
+        over = self.run.friction.leave(alarm.row)
 
         def ahead(t: float) -> float:
             return float(terms(t)[alarm.terms][0]) - over

@@ -37,6 +37,27 @@ LARGEST = 1e290
 """Of a term: sums of it are finite."""
 
 
+class Together:
+    """Terms that several instants are asked for at once, and that are kept.
+
+    Args:
+        evaluate: terms (n, k) at n instants.
+    """
+
+    def __init__(self, evaluate: Callable[[list[float]], Floats]) -> None:
+        self._evaluate, self._known = evaluate, dict[float, Floats]()
+
+    def at(self, times: list[float]) -> list[Floats]:
+        """Terms (k,) at each of these instants."""
+        if missing := [t for t in dict.fromkeys(times) if t not in self._known]:
+            self._known.update(zip(missing, self._evaluate(missing), strict=True))
+        return [self._known[t] for t in times]
+
+    def __call__(self, t: float) -> Floats:
+        """Terms (k,) at an instant."""
+        return self.at([t])[0]
+
+
 def stay_above(terms: Terms, a: float, b: float) -> NDArray[np.bool_]:
     """Return which of the terms (k,) have series on [a, b] that stay above zero; all guards are screened at once."""
     series, tail = _series(terms, a, b, SCREENING)[1:]
@@ -74,7 +95,8 @@ def _series(terms: Terms, a: float, b: float, degree: int) -> tuple[tuple[list[f
     """Return instants with the terms there (degree + 1, k), their series, and what it leaves out (k,)."""
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     times = [a, *(middle + half * PLACES[degree][1:-1]).tolist(), b]
-    values = np.clip([terms(t) for t in times], -LARGEST, LARGEST)  # infinite where nothing fires
+    found = terms.at(times) if isinstance(terms, Together) else [terms(t) for t in times]
+    values = np.clip(found, -LARGEST, LARGEST)  # infinite where nothing fires
     series = SERIES[degree] @ values
     return (times, values), series, np.abs(series[-TAIL:]).sum(axis=0)
 

@@ -34,6 +34,12 @@ SLOW = 1e-3
 """Part of the fastest pole below which a modulus does not count as a scale; 1e-9 of the largest row likewise."""
 
 
+NO_FRICTION = {
+    "verdict": Word.SKIPPED.value,
+    "why": "Friction is compared by motions: what its law makes of a slip near zero is no derivative of Coulomb's.",
+}  # fmt: skip
+
+
 def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Every way of every engine at every place.
 
@@ -48,6 +54,8 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
     poles: list[dict[str, Any]] = []
     for place in found:
         if place.spot is None:
+            if place.model is not None and place.system.frictional:
+                rows += [{"place": place.name, "engine": name, **NO_FRICTION} for name in names]
             continue
         for name in names:
             about = {"place": place.name, "engine": name}

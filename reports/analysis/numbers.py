@@ -18,6 +18,7 @@ from crossbody.reports.analysis.places import Place
 EQUILIBRIA = ("place", "outcome", "variable", "value")
 POLES = ("place", "real", "imag", "frequency", "damping", "led_by")
 RANKS = ("place", "states", "controllable", "observable", "growth")
+REFUSALS = ("place", "why")
 COEFFICIENTS = ("place", "axis", "s^2", "s", "1", "coupling")
 RESPONSES = ("place", "input", "output", "omega", "magnitude", "phase")
 
@@ -62,6 +63,11 @@ def ranks(found: Sequence[Place]) -> pd.DataFrame:
              "observable": observable(place.model), "growth": float(place.model.poles().real.max(initial=-np.inf))}
         )  # fmt: skip
     return pd.DataFrame(rows, columns=list(RANKS))
+
+
+def refusals(found: Sequence[Place]) -> pd.DataFrame:
+    """Why there is no model: one row a place whose law has none."""
+    return pd.DataFrame([(p.name, p.why) for p in found if p.why], columns=list(REFUSALS))
 
 
 def coefficients(found: Sequence[Place]) -> pd.DataFrame:

@@ -2,7 +2,8 @@
 
 The model at a place is minimal: rows that are held stay held, unless their law is what is looked at (a ball in contact,
 soft fingers). What acts from outside on a scene is held at what it is there. A mechanism without a list of places is
-looked at where its run passes: in every mode set that it visits.
+looked at where its run passes: in every mode set that it visits. What slides, or is driven, stands nowhere: its model
+is the tangent of the right-hand side where the run is.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody import cases
-from crossbody.cases import Case, Mode, UnknownName
+from crossbody.cases import Case, Mode, Outcome, SceneError, Trajectory, UnknownName
+from crossbody.cases.arrays import Floats
 from crossbody.engines.equations import system_of
 from crossbody.engines.linear import Spot
 from crossbody.reference import System, delta
@@ -22,7 +24,7 @@ from crossbody.reference.delta import scene
 from crossbody.reference.delta.loop import closed_loop
 from crossbody.reference.linear import LinearModel, Trim, linearise, trim
 
-ON = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
+ON = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +41,7 @@ class Place:
         held: whether the rows that are on are held, instead of following their law.
         powered: whether the case's servos act.
         controlled: whether the model is that of a feedback loop around the equilibrium, in continuous time.
+        why: why there is no model, where the law has none.
     """
 
     name: str
@@ -50,11 +53,12 @@ class Place:
     held: bool
     powered: bool
     controlled: bool = False
+    why: str = ""
 
     @property
     def spot(self) -> Spot | None:
-        """Where an engine has to linearise; None where there is nothing, or what no engine has."""
-        if self.model is None or self.controlled:
+        """Where an engine has to linearise; None where there is nothing, or what no engine has: a loop, friction."""
+        if self.model is None or self.controlled or self.system.frictional:
             return None
         found = self.trim
         rows = tuple(found.active.tolist())
@@ -209,20 +213,63 @@ def _chain(case: Case, at: Mapping[str, float]) -> list[Place]:
 
 
 def _visited(case: Case, at: Mapping[str, float]) -> list[Place]:
-    """Where a run moves least in every set of rows that are on, its bilateral rows held and the others not."""
+    """In every set of rows that are on: where a run moves least, or, where some of them slide, does so fastest."""
     from crossbody import engines
 
-    run = engines.load("reference").prepare(case, "compiled").run()
-    still: dict[tuple[int, ...], tuple[float, int]] = {}
+    run, system = engines.load("reference").prepare(case, "compiled").run(), build(case)
+    follows, drift = np.asarray(system.follows), np.asarray(system.drift)
+    sets: dict[tuple[tuple[int, bool], ...], tuple[float, int]] = {}
     for k, (v, modes) in enumerate(zip(run.v, run.mode, strict=True)):
-        rows = tuple(i for i, mode in enumerate(modes.tolist()) if mode in ON)
-        still[rows] = min(still.get(rows, (np.inf, k)), (float(np.abs(v).max()), k))
-    found = []
-    for rows, (_, k) in still.items():
-        held = not case.law.unilateral[list(rows)].any()
-        words = ", ".join(case.contacts[i] for i in rows if case.law.unilateral[i]) or "nothing"
-        found.append(_place(case, f"touching {words}", rows, held=held, q=run.q[k], t=float(run.t[k])))
-    return found
+        slips = np.abs(system.gap(run.q[k], v)[1] - drift) if system.frictional else v
+        on = [i for i, mode in enumerate(modes.tolist()) if mode in ON]
+        rows = tuple((i, modes[i] == Mode.SLIP) for i in on if follows[i] in (-1, i))
+        slowest = [slips[j : j + system.tangents[i]].max() for i, slides in rows if slides for j in [system.tangent[i]]]
+        least = -min(slowest) if slowest else np.abs(v).max()
+        sets[rows] = min(sets.get(rows, (np.inf, k)), (float(least), k))
+    return [_seen(case, system, run, k, dict(rows)) for rows, (_, k) in sets.items()]
+
+
+def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int, bool]) -> Place:
+    """Sample k of a run, with these rows on and some of them sliding: the equilibrium beside it if there may be one."""
+    sliding, t = [i for i, slides in rows.items() if slides], float(run.t[k])
+    one_way = [i for i in rows if case.law.unilateral[i]]
+    sticks = [case.contacts[i] for i in one_way if system.tangents[i] and not rows[i]]
+    names = {
+        "touching": [case.contacts[i] for i in one_way if not system.tangents[i]],
+        "held by": sticks, "sliding on": [case.contacts[i] for i in sliding],
+    }  # fmt: skip
+    name = ", ".join(f"{how} {', '.join(which)}" for how, which in names.items() if which) or "touching nothing"
+    u, model, why = case.inputs.at(t) if case.inputs is not None else None, None, ""
+    active = np.array(
+        [i for i, f in enumerate(np.asarray(system.follows).tolist()) if i in rows or f in rows], dtype=np.int64
+    )
+    try:
+        if not sliding and system.activations is None:
+            return _place(case, name, list(rows), held=not one_way, q=run.q[k], t=t)
+        model = linearise(
+            system, run.q[k], run.v[k], u, list(rows), sliding=sliding, t=t, activations=_activations(case, system, t),
+            names=[coordinate.name for coordinate in case.velocities],
+        )  # fmt: skip
+    except SceneError as error:
+        why = str(error)
+    passed = Trim(
+        q=run.q[k], v=run.v[k], u=np.zeros(0) if u is None else u, lam=run.lam[k][active], active=active,
+        residual=np.nan, outcome=Outcome.ILL_POSED if why else Outcome.FINISHED, pulling=(),
+    )  # fmt: skip
+    return Place(
+        name=f"{name}, moving", case=case, system=system, trim=passed, model=model, t=t, held=False, powered=True,
+        why=why,
+    )  # fmt: skip
+
+
+def _activations(case: Case, system: System, t: float) -> Floats | None:
+    """What the activations are at t under a case's inputs."""
+    behind = system.activations
+    if behind is None or case.inputs is None:
+        return None
+    u = behind.extended(case.inputs).at(t)
+    since, value = u[-behind.width :].reshape(-1, 2).T
+    return behind.after(value, u[: -behind.width], t - since)
 
 
 PLACES: Mapping[str, Callable[[Case, Mapping[str, float]], list[Place]]] = {

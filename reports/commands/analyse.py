@@ -96,8 +96,9 @@ def analyse(
         "equilibria": work.equilibria(found, case), "poles": work.poles(found), "ranks": work.ranks(found),
         "engines": engines, "engine-poles": engine_poles,
     }  # fmt: skip
-    if len(rows := work.coefficients(found)):
-        tables["coefficients"] = rows
+    for key, more in (("coefficients", work.coefficients(found)), ("refusals", work.refusals(found))):
+        if len(more):
+            tables[key] = more
     if bode and len(rows := work.responses(found, OMEGA)):
         tables["responses"] = rows
     if locus:
@@ -154,6 +155,8 @@ def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
         console.print(_printed(f"{label}: {key}", tables[key].head(SHOWN), digits=6))
         if len(tables[key]) > SHOWN:
             console.print(f"... {len(tables[key]) - SHOWN} more rows; --out DIR keeps all.")
+    for place, why in tables["refusals"].itertuples(index=False) if "refusals" in tables else ():
+        console.print(f"{place}: {why}")
     engines = tables["engines"]
     console.print(_printed(f"{label}: differences of engines", engines[BESIDE].head(SHOWN), digits=2))
     for why in engines["why"].dropna().unique():

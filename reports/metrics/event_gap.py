@@ -13,6 +13,7 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.contacts import AT_REST, CLOSED, LIGHT
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.friction import rubbing
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Event, Trajectory
@@ -30,10 +31,11 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |gap| of unilateral rows at touches and at the end of BALLISTIC, over the row's longest way between samples.
 
     Where a row lets go its multiplier over its own longest way counts as well, and of both the smaller: laws without
-    memory let go at the surface whatever pushes there. Left out are those at whose instant something else happens, by
-    which a multiplier may jump through zero, and a start in contact. Only what is beyond the errors of a row at its
-    surface counts. None without rows that open, and where gaps depend on discrete variables; NaN where an event has no
-    instant.
+    memory let go at the surface whatever pushes there. So does, of a contact that sticks, how far its friction is below
+    its bound: where it reaches that, and would jam, its multiplier jumps to zero. Left out are those at whose instant
+    something else happens, by which a multiplier may jump through zero, and a start in contact. Only what is beyond the
+    errors of a row at its surface counts. None without rows that open, and where gaps depend on discrete variables; NaN
+    where an event has no instant.
     """
     system = equations(case)
     if not case.law.unilateral.any() or len(run.t) < 2 or (system is not None and system.jumps):
@@ -49,7 +51,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
             found.append(gap)
         elif gap > 0.0 and event.before in CLOSED and event.after not in CLOSED and alone(event.t):
             push = _ways(run.t, run.lam[:, row], event.t, light)
-            found.append(0.0 if np.isnan(push) else min(gap, push))
+            found.append(0.0 if np.isnan(push) else min(gap, push, _below_bound(run, case, event)))
     return float(np.max(found))
 
 
@@ -79,6 +81,16 @@ def _alone(run: Trajectory, case: Case, system: System | None) -> Callable[[floa
         return count(events, t) <= 1 and count(others, t) == 0 and not ticks
 
     return alone
+
+
+def _below_bound(run: Trajectory, case: Case, event: Event) -> float:
+    """How far friction of a contact that sticks is below its bound where it lets go, over its longest way; else inf."""
+    rubs = rubbing(run, case) if event.before == Mode.STICK else None
+    if rubs is None:
+        return np.inf
+    k = int(np.searchsorted(rubs.rows, event.contact))
+    below = rubs.mu[k] * rubs.normal[:, k] - np.linalg.norm(rubs.force[:, k], axis=-1)
+    return _ways(run.t, below, event.t, LIGHT * _size(run.lam))
 
 
 def _ways(t: Floats, signal: Floats, instant: float, nothing: float) -> float:

@@ -75,14 +75,40 @@ def multipliers(
     wanted = Hdv + a1 * (H @ v - np.asarray(system.drift)[rows]) + a0 * h + a2 * h**3
     inverse = np.linalg.solve(M, np.column_stack([(f + pushed)[:, None], H.T]))
     G = H @ inverse[:, 1:]
-    size = np.sqrt(np.diag(G))
-    size[size == 0.0] = 1.0
-    values, ways = np.linalg.eigh(G / np.outer(size, size))
+    size, first = _sizes(system, np.diag(G), rows)
+    G, b = G / np.outer(size, size), -(H @ inverse[:, 0] + wanted) / size
+    found, N, S = np.zeros(len(rows)), np.flatnonzero(first), np.flatnonzero(~first)
+    turn = _inverse(G[np.ix_(N, N)])
+    if len(S):
+        held = G[np.ix_(S, N)] @ turn
+        found[S] = _inverse(G[np.ix_(S, S)] - held @ G[np.ix_(N, S)]) @ (b[S] - held @ b[N])
+    found[N] = turn @ (b[N] - G[np.ix_(N, S)] @ found[S])
+    moving: Floats = (_inverse(G) @ G) * size / size[:, None]
+    return found / size, moving
+
+
+def _sizes(system: System, own: Floats, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return what rows are measured by, and which are fulfilled first: all but those of friction that holds.
+
+    Those of contacts of a body that rocks contradict each other, and are met by least squares in what the others leave,
+    each by the size of its contact.
+    """
+    size, leader = np.sqrt(own), np.asarray(system.follows)[rows]
+    first = np.array([i < 0 or not system.tangents[i] for i in leader], dtype=bool)
+    at = {row: k for k, row in enumerate(rows.tolist())}
+    for k in np.flatnonzero(~first):
+        size[k] = max(size[k], size[at.get(int(leader[k]), int(k))])
+    return np.where(size == 0.0, 1.0, size), first
+
+
+def _inverse(G: Floats) -> Floats:
+    """Return the inverse of a symmetric matrix, on the part of it that has one."""
+    if not len(G):
+        return G
+    values, ways = np.linalg.eigh(G)
     kept = values > DEPENDENT * values[-1]
-    values, ways = values[kept], ways[:, kept]
-    found: Floats = -ways @ (ways.T @ ((H @ inverse[:, 0] + wanted) / size) / values) / size
-    moving: Floats = (ways @ ways.T) * size / size[:, None]
-    return found, moving
+    inverse: Floats = (ways[:, kept] / values[kept]) @ ways[:, kept].T
+    return inverse
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:

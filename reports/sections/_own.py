@@ -76,15 +76,17 @@ def _analysis(out: Path) -> tuple[Section, ...]:
 
     drawn = {"poles": draw.pole_figure, "locus": draw.locus_figure, "responses": draw.response_figure,
              "map": draw.map_figure}  # fmt: skip
+    names = {*drawn, *(name for _, name, _ in words.ANALYSIS_TABLES)}
+    found = {name: _rows(out, f"{ANALYSIS}{name}") for name in names if _has(out, f"{ANALYSIS}{name}")}
     plots = tuple(
-        Plot(name=f"{ANALYSIS}{name}", figure=figure(_rows(out, f"{ANALYSIS}{name}")))
+        Plot(name=f"{ANALYSIS}{name}", figure=figure(found[name]))
         for name, figure in drawn.items()
-        if _has(out, f"{ANALYSIS}{name}")
+        if len(found.get(name, ()))
     )
     tables = tuple(
-        _table(title, shown, _rows(out, f"{ANALYSIS}{name}"), f"{ANALYSIS}{name}")
+        _table(title, shown, found[name], f"{ANALYSIS}{name}")
         for title, name, shown in words.ANALYSIS_TABLES
-        if _has(out, f"{ANALYSIS}{name}")
+        if len(found.get(name, ()))
     )
     title = STUDIES["analysis"].TITLE
     return (Section(name="analysis", title=title, text=words.ANALYSIS_TEXT, plots=plots, tables=tables),)

@@ -15,10 +15,11 @@ THROUGHPUT_TEXT = (
 )
 ANALYSIS_TEXT = (
     "Linear models about the equilibria of the case, in the named modes, by exact derivatives of the equations. Rows "
-    "that hold are eliminated, so that their law adds no poles, unless the law itself is studied. A pole with a "
-    "positive real part grows, one with a negative real part decays. Linear stability does not show that an "
-    "equilibrium is reached. Engines are judged by their largest difference from the reference: in the derivatives of "
-    "the accelerations, each row relative to its largest entry, and in the poles, relative to their modulus."
+    "that hold are eliminated, so that their law adds no poles, unless the law itself is studied. Where a contact "
+    "slides, nothing stands: the model is that of the equations about the motion. A pole with a positive real part "
+    "grows, one with a negative real part decays. Linear stability does not show that an equilibrium is reached. "
+    "Engines are judged by their largest difference from the reference: in the derivatives of the accelerations, each "
+    "row relative to its largest entry, and in the poles, relative to their modulus."
 )
 ANALYSIS_TABLES = (
     ("Linear models", "ranks", columns(
@@ -33,6 +34,7 @@ ANALYSIS_TABLES = (
         place="Equilibrium", parameter="Parameter", value=("Limit of stability", Kind.NUMBER), unstable="Unstable",
         frequency=("Frequency [rad/s]", Kind.NUMBER),
     )),
+    ("Without a linear model", "refusals", columns(place="State", why=("Why", Kind.LONG))),
     ("Linear models of engines", "engines", columns(
         place="Equilibrium", engine="Engine", way="Way", slope=("Slope", Kind.NUMBER), poles=("Poles", Kind.NUMBER),
         unexplained=("Unexplained", Kind.NUMBER), limit=("Limit", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),

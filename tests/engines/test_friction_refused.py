@@ -132,11 +132,8 @@ def test_loops_beside_friction_are_refused(scene: Scene) -> None:
 SCENE = sphere_on_floor(0.5, 0.1)
 START = np.array([0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0])
 LINEAR: dict[str, Callable[[Any], Any]] = {
-    "linearise": lambda made: linear.linearise(made, START),
-    "trim": lambda made: linear.trim(made, START),
     "tangents": lambda made: linear.tangents(made, START[None]),
     "poses": lambda made: linear.poses(made, START[None], ()),
-    "sensitivity": lambda made: linear.sensitivity(made, START, np.zeros(6), 0.1),
     "balanced": lambda made: linear.balanced(
         made, [0.0], START[None], np.zeros((1, 6)), np.zeros((1, 6)), unknown=linear.Unknown(rows=(0,))
     ),
@@ -155,7 +152,7 @@ LINEAR: dict[str, Callable[[Any], Any]] = {
 
 
 @pytest.mark.parametrize("name", LINEAR)
-def test_linear_models_and_sensitivities_are_refused(name: str) -> None:
+def test_derivatives_at_many_states_and_estimates_of_forces_are_refused(name: str) -> None:
     made = system(SCENE, case_of(SCENE).law)
     with pytest.raises((SceneError, cases.InvalidValue), match="friction"):
         LINEAR[name](made)

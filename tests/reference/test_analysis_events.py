@@ -14,8 +14,8 @@ from crossbody import cases
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, UnknownName
 from crossbody.reference import System, delta, simulate
 from crossbody.reference.linear import Unknown, balanced, filtered, sensitivity
-from crossbody.reference.linear._derivatives import Point
 from crossbody.reference.linear._kalman import Filter
+from crossbody.reference.linear._point import Point
 from crossbody.reference.systems.ball import KERNELS
 from crossbody.reports.analysis import places as analyse
 

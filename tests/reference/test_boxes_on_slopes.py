@@ -63,6 +63,7 @@ def test_a_box_that_falls_on_its_edge_comes_to_rest(slope: cases.Case, rtol: flo
     assert found.q[-1, 0] == pytest.approx(0.01545844, abs=1e-6)
     assert np.abs(found.q[-1, 1]) < 1e-7
     assert np.abs(found.v[-1]).max() < 1e-6
+    assert found.determined_until == np.inf  # four corners that slide for 1e-9 s, or by 1e-5 m/s, leave nothing open
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -27,7 +27,6 @@ from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.reference import System, simulate
-from crossbody.reference.linear import linearise
 from crossbody.reference.tree.system import system
 
 FURTHER = (1090, 1481, 2129, 2629)
@@ -230,8 +229,6 @@ def test_machines_without_friction_are_refused(options: dict, error: type, told:
         simulate(point(0.5, 0.1), [0, 0], [0, 0], 0.1, **options)
 
 
-def test_collisions_and_linear_models_with_friction_are_refused() -> None:
+def test_frozen_collisions_with_friction_are_refused() -> None:
     with pytest.raises(SceneError, match="friction"):
         simulate(wall([np.inf, 0.5], b0=[1e6, 0.0]), [0, 0], [0, 0], 0.1)
-    with pytest.raises(SceneError, match="friction"):
-        linearise(point(0.5, 0.1), [0.0, 0.0])

@@ -18,7 +18,7 @@ from crossbody.cases.scene_rows import rows_of
 from crossbody.engines.linear import Spot
 from crossbody.reference import System, kernels, simulate
 from crossbody.reference.linear import linearise, sensitivity, tangents, trim
-from crossbody.reference.linear._derivatives import turning
+from crossbody.reference.linear._point import turning
 from crossbody.reference.linear.differences import differences
 from crossbody.reference.tree.system import system
 

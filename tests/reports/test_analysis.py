@@ -349,3 +349,49 @@ def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
         command("bouncing_ball", "linear", [], ["x=1"], locus=None, **common)
     with pytest.raises(CaseUnsupported, match="workspace"):
         command("bouncing_ball", "linear", [], [], locus=None, **{**common, "mapped": True})
+
+
+RUBBING = [
+    (name, variant) for name in cases.names() for variant in cases.variants(name) if cases.load(name, variant).rubs
+]
+
+
+@pytest.mark.parametrize(("name", "variant"), RUBBING)
+def test_every_case_with_friction_has_models_or_says_why_not(name, variant):
+    found = analyse.places(cases.load(name, variant))
+    for place in found:
+        assert (place.model is None) == (bool(place.why) or not place.trim.outcome.ok), place.name
+        assert place.spot is None
+        assert place.model is None or np.isfinite(place.model.A).all()
+    assert any(place.model is not None or place.why for place in found)
+
+
+def test_a_block_on_its_edge_falls_as_its_closed_form_does():
+    case = cases.load("rocking_block")
+    (place,) = analyse.places(case)
+    b, h = (case.number(name) for name in ("width", "height"))
+    R = np.hypot(b, h)
+    rate = np.sqrt(case.number("gravity") * R / ((b * b + h * h) / 3.0 + R * R))
+    assert place.model.poles()[0] == pytest.approx(rate, rel=1e-9)
+
+
+def test_a_slide_downhill_turns_into_its_direction():
+    """y' dies out at mu g cos(slope)/|v| beside a slip along x."""
+    case = cases.load("sliding_block", "stops")
+    slides, holds = analyse.places(case)
+    press = case.number("gravity") / np.hypot(1.0, case.number("slope"))
+    rates = np.sort(slides.model.poles().real)
+    np.testing.assert_allclose(rates[2], -case.number("mu") * press / case.number("speed"), rtol=1e-9)
+    assert holds.name == "held by floor:block"
+
+
+def test_a_page_of_places_without_any_model_says_why(tmp_path):
+    """It had failed where no place had poles."""
+    from crossbody.reports.commands.analyse import analyse as command
+
+    out = tmp_path / "out"
+    none = {"bode": False, "locus": None, "mapped": False, "command": "crossbody analyse"}
+    assert command("stacked_blocks", "apart", [], [], out=out, **none) == 0
+    page = (out / "index.html").read_text()
+    assert "cannot be shown" not in page
+    assert "indeterminate" in page

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -153,3 +155,23 @@ def test_slip_is_counted_from_the_surface(drift: float, monkeypatch: pytest.Monk
     assert found is not None
     np.testing.assert_allclose(found.slip[:, 0, 0], run.v[:, 0] - drift, atol=1e-14)
     np.testing.assert_array_equal(found.mu, 0.2)
+
+
+def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_path: Path) -> None:
+    """Both ends of a foot stick, which no forces keep in place at once; with mu = 1.9 one lets go that would jam."""
+    found = find_spec("gymnasium")
+    if found is None or found.origin is None:
+        pytest.skip("gymnasium is not installed")
+    path = Path(found.origin).parent / "envs" / "mujoco" / "assets" / "walker2d_v5.xml"
+    times = 0.008 * np.arange(40)
+    table = np.column_stack([times, np.random.default_rng(0).uniform(-1.0, 1.0, (125, 6))[:40]])
+    names = ",".join(["t", *(actuator.name for actuator in cases.load(str(path)).scene.actuators)])
+    np.savetxt(tmp_path / "u.csv", table, delimiter=",", header=names, comments="", fmt="%.17g")
+    case = cases.load(str(path), ctrl=str(tmp_path / "u.csv"), t_end=0.3, friction=1)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    assert any(e.before == Mode.STICK and e.after == Mode.BALLISTIC for e in run.events)
+    truth = from_run(run, Tier.D, "itself")
+    for name in ("event_gap", "law_residual", "cone_violation"):
+        value = measured(name, run, case, truth)
+        assert value is not None
+        assert value < 1e-9

@@ -1,0 +1,70 @@
+"""How far contacts are from their bounds, or from a jam, and what is watched of that along a step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core.coulomb import solve
+from crossbody.reference.core.filters import STAGES_RANGE
+from crossbody.reference.core.friction import bound, has_friction, is_dry, is_tangent, most_drift, slip
+from crossbody.reference.core.jams import determinant
+from crossbody.reference.core.layout import NODES, Model, Work
+from crossbody.reference.kinds import Array
+
+
+@compiled
+def without_pull(s: Any, m: Model, w: Work) -> None:
+    """Solve again without what pulls sticking rows back, whose noise would move the instant at which they slip."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if is_tangent(m, i) and not w.slides[i]:
+            w.r[j] += w.law[i, 1] * w.hda[j]
+    solve(s, m, w, w.r, w.la)
+
+
+@compiled
+def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
+    """Write how far every contact is from sliding, or one that slides from a jam, after an evaluation."""
+    without_pull(s, m, w)
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and not w.slides[i]:
+            out[i] = margin(m, w, i, w.la)
+    value, known = 0.0, False
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and w.slides[i] and not is_dry(m, i):
+            if not (known and w.reached[j]):
+                value, known = determinant(s, m, w, j), True
+            out[i] = value
+
+
+@compiled
+def _within_bound(m: Model, i: int, lam: Array, normal: int, first: int) -> float:
+    """By how much friction of contact i is below its bound; its rows stand at `normal` and from `first` on in lam."""
+    square = 0.0
+    for t in range(first, first + m.tangents[i]):
+        square += lam[t] * lam[t]
+    return float(bound(m, i, lam[normal]) - np.sqrt(square))
+
+
+@compiled
+def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether a contact that sticks stays clear of its bound, as far as the stages tell, and where it is."""
+    if slip(m, w, i, w.rates[NODES - 1]) > most_drift(s):
+        return False
+    low, high = np.inf, -np.inf
+    for stage in range(s.end + 1):
+        lam = w.lams[0] if stage == 0 else (w.lam_at[stage] if stage < s.end else w.lams[NODES - 1])
+        value = _within_bound(m, i, lam, i, m.tangent[i])
+        low, high = min(low, value), max(high, value)
+    return bool(low > 0.0 and low > STAGES_RANGE * (high - low))
+
+
+@compiled
+def margin(m: Model, w: Work, i: int, la: Array) -> float:
+    """By how much friction of contact i is below its bound, from the multipliers of the rows in contact."""
+    return float(_within_bound(m, i, la, w.listed[i], w.listed[m.tangent[i]]))

@@ -1,0 +1,42 @@
+"""Directions in which contacts slide: those of their slips, or of reference where these vanish."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core.friction import has_friction, small_slip
+from crossbody.reference.core.layout import Model, Work
+
+
+@compiled
+def lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
+    """Return the slip velocity (x, y) of contact i, one that is small or points back lengthened along its reference.
+
+    So its direction changes steadily to that of reference where it vanishes, and is never more than a right angle off
+    it: a jump would end every step. Clear of zero and ahead it is left as it is.
+    """
+    t, small = m.tangent[i], small_slip(s)
+    p, r = w.way[t], w.way[t + 1]
+    ahead, aside = x * p + y * r, y * p - x * r
+    part = 1.0 - (aside / small) ** 2 if abs(aside) < small else 0.0
+    ahead = max(ahead, small * part * part)
+    return ahead * p - aside * r, ahead * r + aside * p
+
+
+@compiled
+def take_directions(s: Any, m: Model, w: Work, turning: bool) -> None:
+    """Leave in w.along the direction in which every sliding contact slides, or that of reference."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if not has_friction(m, i) or not w.slides[i]:
+            continue
+        t, c = m.tangent[i], w.listed[m.tangent[i]]
+        w.along[c] = w.way[t]
+        if m.tangents[i] > 1:
+            x, y = lengthened(s, m, w, i, w.hda[c] - w.rest[t], w.hda[c + 1] - w.rest[t + 1])
+            size = np.sqrt(x * x + y * y)
+            follows = turning and size > 0.0
+            w.along[c], w.along[c + 1] = (x / size, y / size) if follows else (w.way[t], w.way[t + 1])

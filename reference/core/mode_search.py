@@ -1,0 +1,245 @@
+"""The search for a set of modes that agrees with its forces.
+
+A contact whose slip velocity is clear of zero slides along it. For those that stand, with la the multipliers and a by
+how much faster than its law every row moves, a set of modes is consistent if
+
+    STICK   |lam_t| <= mu lam_n
+    SLIP    s . a_t >= 0,  s parallel to a_t
+    off     a_n >= 0                    and lam_n >= 0 of both others
+
+One change at a time, of what is violated most, finds most of them. Where that comes back to a set it goes on from what
+60 sweeps of projected Gauss-Seidel give, and at last through the sets that differ from that in few contacts.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core.beginnings import look_around, turn
+from crossbody.reference.core.friction import bound, decided_to, has_friction, is_dry
+from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
+from crossbody.reference.core.mode_set import ahead, aside, evaluate_set, first_row, jammed, keep, put, size_along
+from crossbody.reference.core.slips import CLEAR
+
+SWEEPS = 60
+TURNS = 40  # of directions of slip towards those of acceleration
+TURNED = 1e-12
+MOST_SETS = 256
+WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
+
+
+@compiled
+def _worst(s: Any, m: Model, w: Work) -> int:
+    """The contact that violates its mode most, -1 if none does; w.wants has the modes that all would rather have."""
+    found, most = -1, decided_to(s)
+    for j in range(s.na):
+        i = w.idx[j]
+        if not has_friction(m, i):
+            continue
+        w.wants[i] = w.state[i]
+        if w.state[i] == FREE:
+            missing, becomes = -w.excess[j], STICK if w.stands[i] else SLIP
+        else:
+            missing, becomes = -w.load[j] * w.gram[j, j], FREE
+            if is_dry(m, i):
+                missing = -1.0
+            other, then = -1.0, STICK
+            if w.state[i] == STICK:
+                other, then = (size_along(m, w, i, w.la) - bound(m, i, max(w.la[j], 0.0))) * w.gram[j, j], SLIP
+            elif w.stands[i]:
+                other = max(-ahead(m, w, i), abs(aside(m, w, i)))
+            if other > missing:
+                missing, becomes = other, then
+        if missing > decided_to(s):
+            w.wants[i] = becomes
+        if missing > most:
+            found, most = i, missing
+    return found
+
+
+@compiled
+def _change(m: Model, w: Work, i: int, becomes: int) -> None:
+    """Put contact i in another mode; one that begins to slide does so against the force that held it."""
+    if becomes == SLIP and w.stands[i]:
+        size = size_along(m, w, i, w.la)
+        for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
+            w.way[w.idx[c]] = -w.la[c] / size
+    put(m, w, i, becomes)
+
+
+@compiled
+def _seen(s: Any, m: Model, w: Work) -> bool:
+    """Whether the set stood before since s.sets was set to 0; note it."""
+    for r in range(s.sets):
+        same = True
+        for i in range(s.nc):
+            same = same and w.sets[r, i] == w.state[i]
+        if same:
+            return True
+    if s.sets == len(w.sets):
+        return True
+    for i in range(s.nc):
+        w.sets[s.sets, i] = w.state[i]
+    s.sets += 1
+    return False
+
+
+@compiled
+def judge(s: Any, m: Model, w: Work) -> int:
+    """Evaluate the set, with directions that agree with what they lead to; the contact that violates it most, or -1."""
+    evaluate_set(s, m, w)
+    for _ in range(TURNS):
+        if turn(s, m, w) <= TURNED:
+            break
+        evaluate_set(s, m, w)
+    if s.unsteady >= 0:
+        look_around(s, m, w, s.unsteady)
+    worst = _worst(s, m, w)
+    if worst >= 0 and w.state[worst] == SLIP and w.wants[worst] == STICK and m.tangents[worst] > 1:
+        look_around(s, m, w, worst)
+        worst = _worst(s, m, w)
+    return worst
+
+
+@compiled
+def iterate(s: Any, m: Model, w: Work, together: int) -> bool:
+    """Change the WORST of what is violated, or ALL of it together, until nothing is; False if a set comes again.
+
+    Corners of one box begin to slide together: one after another they would each choose another direction.
+    """
+    s.sets = 0
+    while not _seen(s, m, w):
+        i = judge(s, m, w)
+        if i < 0:
+            return jammed(s, m, w) < 0
+        for j in range(s.na):
+            k = w.idx[j]
+            if has_friction(m, k) and (k == i or together == ALL) and w.wants[k] != w.state[k]:
+                _change(m, w, k, w.wants[k])
+    return False
+
+
+@compiled
+def _relax(s: Any, m: Model, w: Work, j: int) -> None:
+    """One projected step of the row in place j."""
+    if not w.gram[j, j] > 0.0:
+        return
+    total = w.bare[j]
+    for c in range(s.na):
+        total -= w.gram[j, c] * w.la[c]
+    w.la[j] += total / w.gram[j, j]
+
+
+@compiled
+def aim(m: Model, w: Work, i: int) -> None:
+    """Take the direction against its force for that in which contact i would slide, or that in which it is driven."""
+    force, drive = size_along(m, w, i, w.la), size_along(m, w, i, w.bare)
+    for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
+        if force > 0.0:
+            w.way[w.idx[c]] = -w.la[c] / force
+        elif drive > 0.0:
+            w.way[w.idx[c]] = -w.bare[c] / drive
+
+
+@compiled
+def _sweep(s: Any, m: Model, w: Work) -> None:
+    """Projected Gauss-Seidel from no forces; put every contact in the mode that its force then has."""
+    for j in range(s.na):
+        w.la[j] = 0.0
+    for _ in range(SWEEPS):
+        for j in range(s.na):
+            i = w.idx[j]
+            if m.follows[i] >= 0 and has_friction(m, m.follows[i]) and not is_dry(m, i):
+                continue
+            if not is_dry(m, i):
+                _relax(s, m, w, j)
+                if m.unilateral[i]:
+                    w.la[j] = max(w.la[j], 0.0)
+            if has_friction(m, i):
+                first, last, most = first_row(m, w, i), first_row(m, w, i) + m.tangents[i], bound(m, i, w.la[j])
+                for c in range(first, last):
+                    if w.stands[i]:
+                        _relax(s, m, w, c)
+                    else:
+                        w.la[c] = -most * w.along[c]
+                size = size_along(m, w, i, w.la)
+                for c in range(first, last):
+                    w.la[c] *= min(1.0, most / size) if size > 0.0 else 1.0
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i):
+            if w.stands[i]:
+                aim(m, w, i)
+            if w.la[j] * w.gram[j, j] <= decided_to(s) and not is_dry(m, i):
+                put(m, w, i, FREE)
+            elif w.stands[i] and size_along(m, w, i, w.la) < (1.0 - CLEAR) * bound(m, i, w.la[j]):
+                put(m, w, i, STICK)
+            else:
+                put(m, w, i, SLIP)
+
+
+@compiled
+def swept(s: Any, m: Model, w: Work, together: int) -> bool:
+    """Whether a consistent set is found from what sweeps give."""
+    _sweep(s, m, w)
+    return bool(iterate(s, m, w, together))
+
+
+@compiled
+def vary(s: Any, m: Model, w: Work, number: int) -> int:
+    """Put contacts in the modes that a number says digit by digit, 0 for that of w.sets[0]; how many differ.
+
+    Directions of slip are those of reference, and of the digit 3 their opposites.
+    """
+    changed = 0
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i):
+            digit, number = number % 4, number // 4
+            changed += digit > 0
+            start = w.sets[0, i]
+            state = start if digit == 0 else (STICK if digit == 1 else SLIP)
+            if digit == 3 and w.stands[i]:
+                for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
+                    w.way[w.idx[c]] = -w.way[w.idx[c]]
+            elif digit == 3 or (digit == 1 and not w.stands[i]) or digit == start_digit(start):
+                state = start if is_dry(m, i) else FREE
+            put(m, w, i, state)
+    return changed
+
+
+@compiled
+def start_digit(state: int) -> int:
+    """The digit that would name the mode in which a contact is already: it stands for being off."""
+    return 1 if state == STICK else (2 if state == SLIP else 0)
+
+
+@compiled
+def near_sets(s: Any, m: Model, w: Work) -> bool:
+    """Try sets by the number of contacts in which they differ from the present one; whether one is consistent."""
+    _sweep(s, m, w)
+    keep(s, w)
+    contacts = 0
+    for j in range(s.na):
+        contacts += has_friction(m, w.idx[j])
+    tried, all_sets = 0, 4 ** min(contacts, 12)
+    for differing in range(1, contacts + 1):
+        for number in range(all_sets):
+            digits, rest = 0, number
+            while rest > 0:
+                digits += rest % 4 > 0
+                rest //= 4
+            if digits != differing:
+                continue
+            for i in range(s.nc):
+                w.way[i] = w.kept_way[i]
+            vary(s, m, w, number)
+            if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
+                return True
+            tried += 1
+            if tried >= MOST_SETS:
+                return False
+    return False

@@ -1,0 +1,116 @@
+"""Slip velocities from step to step: directions of reference, slips that begin, pass zero or die out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core.friction import (
+    bound,
+    count_from_none,
+    has_begun,
+    has_friction,
+    is_tangent,
+    slip,
+    slip_along,
+    small_slip,
+)
+from crossbody.reference.core.guards import STOP
+from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.kinds import Array
+
+CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip counts from none
+LINGERS = 10.0  # times as long as friction takes to stop what has no direction: what slides so slowly is held
+
+
+@compiled
+def begin(w: Work) -> None:
+    """Forget what another run of the same workspace has left."""
+    for left in (w.way, w.rest, w.tolerated, w.open_v, w.open_rate):
+        left[:] = 0.0
+    w.off[:], w.begins[:], w.since[:], w.within[:] = 0, 0, -np.inf, np.inf
+
+
+@compiled
+def _face(m: Model, w: Work, i: int, rate: Array) -> None:
+    """Take the direction of the present slip velocity of contact i for that of reference."""
+    size = slip(m, w, i, rate)
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        w.way[t] = (rate[t] - m.drift[t] - w.rest[t]) / size
+
+
+@compiled
+def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
+    """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips."""
+    for i in range(s.nc):
+        if has_friction(m, i):
+            s.slip_speed = max(s.slip_speed, slip(m, w, i, rate), abs(rate[i]))
+    for j in range(s.na):
+        i, size = w.idx[j], 0.0
+        for c in range(m.span[i, 0], m.span[i, 1] if is_tangent(m, i) else 0):
+            size += abs(w.H[j, c] * w.y[s.nq + c])
+        s.slip_speed = max(s.slip_speed, size)
+
+
+@compiled
+def turns_aside(s: Any, m: Model, w: Work) -> bool:
+    """Whether a contact whose slip falls to zero along its direction of reference slides on across it; rates in w.rate.
+
+    It has turned by a right angle within the step, and friction with it: too fast for what the step knows of any guard.
+    """
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta and w.kind[i] == STOP:
+            along = slip_along(m, w, i, w.rate)
+            if slip(m, w, i, w.rate) ** 2 - along * along > small_slip(s) ** 2:
+                return True
+    return False
+
+
+@compiled
+def _rest(m: Model, w: Work, i: int) -> float:
+    """Size of the slip velocity with which contact i began."""
+    square = 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        square += w.rest[t] * w.rest[t]
+    return float(np.sqrt(square))
+
+
+@compiled
+def _lingers(s: Any, m: Model, w: Work, i: int, rate: Array) -> bool:
+    """Whether contact i has been sliding without a direction for far longer than its friction takes to stop it.
+
+    Others hold the body, and what they leave it dies out without ever passing zero. Such a contact is at rest.
+    """
+    if has_begun(w, i) or slip(m, w, i, rate) > small_slip(s):
+        w.within[i] = np.inf
+        return False
+    w.within[i] = min(w.within[i], s.t)
+    c = w.listed[m.tangent[i]]
+    brake = bound(m, i, w.lam0[i]) * w.gram[c, c]
+    return bool((s.t - w.within[i]) * brake > LINGERS * small_slip(s))
+
+
+@compiled
+def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
+    """Take the directions of the present slip velocities for those of reference, where they are clear of zero.
+
+    Whether contacts have stopped without passing zero: they are marked as if they had passed it.
+    """
+    note_speed(s, m, w, rate)
+    linger = False
+    for i in range(s.nc):
+        if has_friction(m, i) and w.slides[i]:
+            if has_begun(w, i) and slip(m, w, i, rate) > CLEAR * max(small_slip(s), _rest(m, w, i)):
+                count_from_none(m, w, i)
+                s.watched = 0
+            if slip(m, w, i, rate) > small_slip(s):
+                _face(m, w, i, rate)
+            if m.tangents[i] > 1:
+                s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
+            if _lingers(s, m, w, i, rate):
+                w.hit[i], w.kind[i], linger = 0.0, STOP, True
+    if s.na > 0 and s.dependent_rows > 0:
+        s.redundant = max(s.redundant, s.dependent_rows)
+    return linger

@@ -1,0 +1,203 @@
+"""Friction on the way of a motion's derivatives: directions of slip, what is grazed, and which events have a cause.
+
+Where a contact comes to slide out of sticking nothing jumps, and its saltation matrix is the identity. Where a slip
+stops, the force along it jumps; what lies across it has died out by then, since friction turns a slip at a rate of
+mu lam_n/(m |v_t|). Deviations by which a contact that sticks would slip die out within times of their own size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from crossbody.cases import Event, Mode, SceneError, Trajectory
+from crossbody.reference._system import System
+from crossbody.reference.kinds import Floats
+from crossbody.reference.linear._derivatives import saddle
+from crossbody.reference.linear._point import Point, gaps
+from crossbody.reference.linear._rubbing import given_way, independent
+from crossbody.reference.linear._variation import (
+    Theta,
+    cone_gradient,
+    gap_gradient,
+    lam_gradient,
+    rates,
+    slip_gradient,
+    slips,
+    slopes,
+)
+
+ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
+STILL = 1e-7  # part of the largest slip, below which one in space has the direction that it had last, or has next
+FAST = 1e-2  # part of the largest slip, below which one that grows in space turns too fast for an explicit method
+NONE = 1e-6  # part of its size below which what is looked at at an event counts as what fell to zero
+GRAZED = 1e-8  # part of the largest slip, or of a bound, to which a contact may come without an event
+EDGE = 1e-6  # part of an arc at its start at which nothing is grazed yet
+ALIKE = 1e-6  # part of the shifts of two events by which they may differ and still be one
+AS_ONE = (
+    "sensitivity: several rows switch as one at t = {t:.9g} s; a deviation parts them, and what follows then depends "
+    "on which of them comes first, so there is no derivative."
+)
+TURNS_BACK = (
+    "sensitivity: the slip of row {i} turns back through zero at t = {t:.9g} s; beside this motion it turns round in "
+    "space instead, so that there is no derivative."
+)
+SHARED = (
+    "sensitivity: row {i} slides at t = {t:.9g} s out of a load that it shared, and the law does not say how a "
+    "deviation changes its share (indeterminate)."
+)
+Place = Callable[[Point, float, Floats], Point]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Slipping:
+    """Contacts with friction along a motion.
+
+    Attributes:
+        system: the mechanism. over: parameters. run: the motion. place: a point moved to a time and a state.
+        speed: largest slip in the motion.
+    """
+
+    system: System
+    over: Theta
+    run: Trajectory
+    place: Place
+    speed: float
+
+    def directed(self, at: Point, modes: Sequence[int], k: int) -> Point:
+        """The point with what slides there: in a plane, or without speed, in the direction that sample k has."""
+        sliding = [i for i, mode in enumerate(modes) if mode == Mode.SLIP and self.system.tangents[i] > 0]
+        way = np.full(self.system.nc, np.nan)
+        for i in sliding:
+            rows, slip = self._rows(i), slips(at, at.q, at.v, i)
+            size = float(np.linalg.norm(slip))
+            if len(rows) == 1 or size <= 0.5 * STILL * self.speed:
+                way[rows] = self._way(i, k)
+            elif size <= 1.5 * STILL * self.speed:
+                way[rows] = slip / size
+        return independent(replace(at, sliding=np.array(sliding, dtype=np.int64), way=way))
+
+    def _rows(self, i: int) -> Any:
+        return int(self.system.tangent[i]) + np.arange(int(self.system.tangents[i]))
+
+    def _way(self, i: int, k: int) -> Floats:
+        """Direction in which contact i slides at a sample: against its friction."""
+        force = self.run.lam[k, self._rows(i)]
+        way: Floats = -force / np.linalg.norm(force)
+        return way
+
+    def turns(self, here: Point) -> tuple[list[Any], bool]:
+        """Where slips in space come to have a direction, lose it, or turn slowly at last; and whether one turns fast.
+
+        Args:
+            here: the point at which an arc begins.
+
+        Returns:
+            Conditions that end an arc, for `scipy.integrate.solve_ivp`.
+        """
+        ends, stiff = list[Any](), False
+        for i in [i for i in here.sliding.tolist() if self.system.tangents[i] > 1]:
+            f, slip = rates(here), slips(here, here.q, here.v, i)
+            held = given_way(here, self._rows(i)) is not None
+            limits = [(2.0 * STILL, 1.0) if held else (STILL, -1.0)]
+            grows = float(slip @ (slip_gradient(here, self.over, i)[:, : len(f)] @ f)) >= 0.0
+            if np.linalg.norm(slip) < FAST * self.speed and (grows or np.linalg.norm(slip) < 0.1 * STILL * self.speed):
+                stiff = True
+                limits.append((FAST, 1.0))
+            ends += [self._crossing(here, i, limit * self.speed, way) for limit, way in limits]
+        return ends, stiff
+
+    def _crossing(self, here: Point, i: int, limit: float, way: float) -> Any:
+        def crossed(t: float, y: Floats) -> float:
+            moved = self.place(here, t, y)
+            return float(np.linalg.norm(slips(moved, moved.q, moved.v, i)) - limit)
+
+        crossed.terminal, crossed.direction = True, way  # type: ignore[attr-defined]
+        return crossed
+
+    def watches(self, here: Point) -> list[tuple[Callable[[Point], float], Any]]:
+        """How far every contact is from its next event, as a part of what may be, and where that is least."""
+        found = list[tuple[Callable[[Point], float], Any]]()
+        for i in np.flatnonzero(np.asarray(self.system.tangents)).tolist():
+            if i in here.sliding:
+                found.append(self._watch(here, lambda at, i=i: self._slip_left(at, i)))  # type: ignore[misc]
+            elif len(here.tangents(i)) and not self._shares(here, i):
+                found.append(self._watch(here, lambda at, i=i: self._cone_left(at, i)))  # type: ignore[misc]
+        return found
+
+    def _watch(self, here: Point, left: Callable[[Point], tuple[float, float]]) -> tuple[Callable[[Point], float], Any]:
+        def slope(t: float, y: Floats) -> float:
+            return left(self.place(here, t, y))[1]
+
+        slope.terminal, slope.direction = False, 1.0  # type: ignore[attr-defined]
+        return lambda at: left(at)[0], slope
+
+    def _slip_left(self, at: Point, i: int) -> tuple[float, float]:
+        """Slip of contact i along its direction over the largest one, and its rate."""
+        slip, f = slips(at, at.q, at.v, i), rates(at)
+        given = given_way(at, self._rows(i))
+        way = slip / np.linalg.norm(slip) if given is None else given
+        change = slip_gradient(at, self.over, i)[:, : len(f)] @ f
+        return float(way @ slip) / self.speed, float(way @ change) / self.speed
+
+    def _cone_left(self, at: Point, i: int) -> tuple[float, float]:
+        """By how much contact i is below its bound, over that, and its rate."""
+        value, gradient, bound = cone_gradient(at, self.over, i)
+        f = rates(at)
+        return value / bound, float(gradient[: len(f)] @ f) / bound
+
+    def _shares(self, here: Point, i: int) -> bool:
+        return bool(np.isin([i, *here.active[here.tangents(i)]], here.sharing).any())
+
+    def reached(self, e: Event, here: Point, k: int) -> Floats | None:
+        """Gradient of what fell to zero at an event; None if nothing did, so that it follows from another.
+
+        Args:
+            e: the event.
+            here: the point before it.
+            k: the last sample before it.
+
+        Raises:
+            SceneError: where the event has no derivative.
+        """
+        i = e.contact
+        if e.before is Mode.STICK and e.after is Mode.SLIP:
+            if self._shares(here, i):
+                raise SceneError(SHARED.format(i=i, t=e.t))
+            value, gradient, size = cone_gradient(here, self.over, i)
+        elif e.before is Mode.SLIP and e.after in (Mode.STICK, Mode.SLIP):
+            slip, size = slips(here, here.q, here.v, i), self.speed
+            value, gradient = float(np.linalg.norm(slip)), self._way(i, k) @ slip_gradient(here, self.over, i)
+            if value <= NONE * size and e.after is Mode.SLIP and len(slip) > 1:
+                raise SceneError(TURNS_BACK.format(i=i, t=e.t))
+        elif e.before in ACTIVE:
+            lam = slopes(here, self.over)[1]
+            value, size = lam[here.active.tolist().index(i)], float(np.abs(self.run.lam).max())
+            gradient = lam_gradient(here, self.over, i)
+        else:
+            rate = e.before is not Mode.FREE
+            value = gaps(here, here.q, here.v)[i + self.system.nc * rate]
+            size, gradient = (
+                float(np.abs(here.v if rate else here.q).max()),
+                gap_gradient(here, self.over, i, rate=rate),
+            )
+        return gradient if abs(value) <= NONE * abs(size) else None
+
+    def hold(self, here: Point, S: Floats) -> None:
+        """Let deviations S (2 n, ...) by which contacts that stick would slip die out, in place."""
+        n, K = self.system.n, None
+        for i in np.flatnonzero(np.asarray(self.system.tangents)).tolist():
+            if i in here.sliding or not len(here.tangents(i)):
+                continue
+            K = saddle(here)[0] if K is None else K
+            gradient = slip_gradient(here, self.over, i)
+            for place, row in zip(here.tangents(i), gradient, strict=True):
+                unit = np.zeros(len(K))
+                if place in here.solved:
+                    unit[n + here.solved.tolist().index(place)] = 1.0
+                    change = row[: 2 * n] @ S
+                    change[2 * n :] += row[2 * n :]
+                    S[n:] -= np.outer(np.linalg.solve(K, unit)[:n], change)

@@ -1,0 +1,246 @@
+"""Which contacts stick, slide and let go where several may change at once, apart from the compiled rules (spec 7.3).
+
+All that stand stick, then all that is violated changes, then what a projected Gauss-Seidel method converges to is
+taken, then sets that differ in few contacts. Directions in which contacts begin to slide are those of their
+accelerations, by SciPy's root finder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import islice, product
+
+import numpy as np
+from scipy.optimize import root
+
+from crossbody.cases import Mode
+from crossbody.reference.kinds import Floats
+from crossbody.reference.sundials.balance import Balance
+from crossbody.reference.sundials.equations import ULP
+from crossbody.reference.sundials.sliding import Seen, Sliding
+
+AGREES = 1e-10  # part of the largest acceleration by which a set of modes may be off
+SWEEPS = 3000
+MOST_SETS = 4096
+STAYS = 1e-7  # part of the largest acceleration, below which what begins to slide goes nowhere
+JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
+CLEAR = 1e-5  # likewise, of what goes on where others have come to a jam
+FAR = 1e6  # times what one row alone would ask for: sweeps that lead there diverge
+SETTLED = 1e-14  # part of the largest multiplier by which the last sweep changes any
+WITHIN = 1e-7  # part of its bound by which a force must stay below it to count as that of a contact that sticks
+
+
+@dataclass(slots=True)
+class Tried:
+    """A set of modes with its directions of slip, forces, and by how much faster than their laws rows move."""
+
+    modes: dict[int, Mode]
+    ways: dict[int, Floats]
+    lam: Floats
+    excess: Floats
+
+
+class ModeProblem:
+    """The contacts that press, or may, at one instant.
+
+    Args:
+        sliding: what evaluates sets of their modes.
+        seen: their rows.
+        contacts: those that are asked about.
+        slides: directions of those that slide on; all others with friction stand.
+        begins: directions of those that have reached their bounds.
+        jams: whether some have just come to a jam.
+    """
+
+    def __init__(
+        self, sliding: Sliding, seen: Seen, contacts: list[int], slides: dict[int, Floats], begins: dict[int, Floats],
+        jams: bool,
+    ) -> None:  # fmt: skip
+        self.sliding, self.seen, self.slides, self.begins, self.jams = sliding, seen, slides, begins, jams
+        self.stands = {i for i in contacts if i in sliding.ways} - slides.keys()
+        self.modes = {i: self._pressed(i, slides) for i in contacts}
+        self.scale = float(np.abs(seen.bare).max(initial=0.0))
+        self.limit = AGREES * self.scale
+
+    def consistent(self) -> Tried | None:
+        """A set of modes that agrees with its forces, None if none is found."""
+        modes = {**self.modes, **dict.fromkeys(self.begins, Mode.SLIP)}
+        ways = {**self.slides, **self.begins}
+        found = self._pivoted(modes, ways) or self._swept(modes, ways) or self._searched(modes, ways)
+        if found is not None and (still := self._going_nowhere(found)):
+            held = {i: Mode.STICK if i in still else mode for i, mode in found.modes.items()}
+            tried = self._tried(held, {i: way for i, way in found.ways.items() if i not in still})
+            if self._holds(tried):
+                found = tried
+        return found
+
+    def jammed(self, modes: Mapping[int, Mode], ways: Mapping[int, Floats]) -> list[int]:
+        """The contacts that slide and jam, with others or alone."""
+        balance, found = self._balance(modes, ways), list[int]()
+        for i in (i for i in ways if modes[i] == Mode.SLIP and i not in self.sliding.dry):
+            values = balance.jam(i)
+            real = values.real[np.abs(values.imag) <= ULP * np.abs(values)]
+            if not (real > (CLEAR if self.jams else JAMMED)).all():
+                found.append(i)
+        return sorted(found)
+
+    def _balance(self, modes: Mapping[int, Mode], ways: Mapping[int, Floats]) -> Balance:
+        part = self.seen.part([row for row in self.seen.rows if modes[self.sliding.owner[row]] != Mode.FREE])
+        return self.sliding.balance(part, modes, {i: way for i, way in ways.items() if modes[i] == Mode.SLIP})
+
+    def _pressed(self, i: int, ways: Mapping[int, Floats]) -> Mode:
+        """The mode of a contact that presses."""
+        return Mode.CONTACT if i not in self.sliding.ways else Mode.SLIP if i in ways else Mode.STICK
+
+    def _holds(self, tried: Tried) -> bool:
+        return not self._violated(tried) and not self.jammed(tried.modes, tried.ways)
+
+    def _going_nowhere(self, found: Tried) -> set[int]:
+        """The contacts that would begin to slide, though others hold them where they are."""
+        begin = {i for i in self.stands if found.modes[i] == Mode.SLIP} - self.begins.keys() - self.sliding.dry
+        return {i for i in begin if np.linalg.norm(found.excess[self._along(i)]) <= STAYS * self.scale}
+
+    def _along(self, i: int) -> list[int]:
+        """Places of the tangential rows of contact i."""
+        return [self.seen.at[t] for t in self.sliding.ways.get(i, ())]
+
+    def _tried(self, modes: dict[int, Mode], ways: dict[int, Floats]) -> Tried:
+        """Evaluate a set; contacts that begin to slide do so where their own accelerations go."""
+        free = [i for i in ways if i in self.stands and len(ways[i]) > 1 and modes[i] == Mode.SLIP]
+
+        def turned(angles: Floats) -> dict[int, Floats]:
+            return {**ways, **{i: np.array([np.cos(a), np.sin(a)]) for i, a in zip(free, angles, strict=True)}}
+
+        def aside(angles: Floats) -> Floats:
+            tried = self._solved(modes, turned(angles))
+            return np.array([self._across(tried, i) for i in free])
+
+        found = self._solved(modes, dict(ways))
+        if free and max(abs(self._across(found, i)) for i in free) > self.limit:
+            start = np.array([np.arctan2(ways[i][1], ways[i][0]) for i in free])
+            found = self._solved(modes, turned(root(aside, start, tol=1e-13).x))
+        return found
+
+    def _solved(self, modes: dict[int, Mode], ways: dict[int, Floats]) -> Tried:
+        """Evaluate a set as it is, some of whose contacts may be off."""
+        balance, lam = self._balance(modes, ways), np.zeros(len(self.seen.rows))
+        lam[[self.seen.at[row] for row in balance.seen.rows]] = balance.forces(pulled=False)
+        return Tried(modes, ways, lam, self.seen.G @ lam - self.seen.bare)
+
+    def _across(self, tried: Tried, i: int) -> float:
+        a, b = (tried.excess[k] for k in self._along(i))
+        way = tried.ways[i]
+        return float(way[0] * b - way[1] * a)
+
+    def _violated(self, tried: Tried) -> dict[int, tuple[float, Mode]]:
+        """By how much contacts violate their modes, m/s^2, and the modes that they would rather have."""
+        found: dict[int, tuple[float, Mode]] = {}
+        for i, mode in tried.modes.items():
+            k, heavy = self.seen.at[i], self.seen.G[self.seen.at[i], self.seen.at[i]]
+            if mode == Mode.FREE:
+                off = [
+                    (-tried.excess[k], self._pressed(i, {j: w for j, w in tried.ways.items() if j not in self.stands}))
+                ]
+            else:
+                off = [(-tried.lam[k] * heavy, Mode.FREE)] if i not in self.sliding.dry else [(-1.0, mode)]
+                ways = self._along(i)
+                if mode == Mode.STICK:
+                    force = float(np.linalg.norm(tried.lam[ways]))
+                    bound = max(self.sliding.bound(self.seen, tried.lam, i), 0.0)
+                    off.append(((force - bound) * heavy, Mode.SLIP))
+                elif mode == Mode.SLIP and i in self.stands:
+                    off.append((-float(tried.ways[i] @ tried.excess[ways]), Mode.STICK))
+                    if len(ways) > 1:
+                        off.append((abs(self._across(tried, i)), Mode.STICK))
+            worst = max(off, key=lambda one: one[0])
+            if worst[0] > self.limit:
+                found[i] = worst
+        return found
+
+    def _pivoted(self, modes: dict[int, Mode], ways: dict[int, Floats], alone: bool = False) -> Tried | None:
+        """Change what is violated, all of it or the worst alone, until nothing is; None where sets come again."""
+        known: set[tuple[Mode, ...]] = set()
+        modes, ways = dict(modes), dict(ways)
+        while tuple(modes.values()) not in known:
+            known.add(tuple(modes.values()))
+            tried = self._tried(modes, ways)
+            wrong = self._violated(tried)
+            if not wrong:
+                return None if self.jammed(tried.modes, tried.ways) else tried
+            ways, modes = dict(tried.ways), dict(modes)
+            for i in [max(wrong, key=lambda i: wrong[i][0])] if alone else list(wrong):
+                modes[i] = wrong[i][1]
+                if modes[i] == Mode.SLIP and i in self.stands:
+                    force = tried.lam[self._along(i)]
+                    ways[i] = -force / np.linalg.norm(force)
+        return None
+
+    def _searched(self, modes: dict[int, Mode], ways: dict[int, Floats]) -> Tried | None:
+        """Try sets by the number of contacts in which they differ from those given; none of many contacts."""
+        choices = [
+            sorted({self._pressed(i, {}) if i in self.stands else modes[i], Mode.SLIP, Mode.FREE} - {modes[i]})
+            if i in self.sliding.ways and i not in self.sliding.dry else [] for i in modes
+        ]  # fmt: skip
+        sets = [dict(zip(modes, one, strict=True)) for one in islice(
+            product(*([mode, *other] for mode, other in zip(modes.values(), choices, strict=True))), MOST_SETS
+        )]  # fmt: skip
+        for one in sorted(sets, key=lambda one: sum(one[i] != modes[i] for i in modes)):
+            aims = {i: ways.get(i, self._aim(i)) for i in one if one[i] == Mode.SLIP}
+            for sign in (1.0, -1.0):
+                turned = {i: way * (sign if i in self.stands else 1.0) for i, way in aims.items()}
+                tried = self._tried(dict(one), turned)
+                if self._holds(tried):
+                    return tried
+        return None
+
+    def _aim(self, i: int) -> Floats:
+        """Direction in which what acts drives contact i along its surface."""
+        drive = -self.seen.bare[self._along(i)]
+        size = float(np.linalg.norm(drive))
+        return drive / size if size > 0.0 else np.eye(len(drive))[0]
+
+    def _swept(self, modes: dict[int, Mode], ways: dict[int, Floats]) -> Tried | None:
+        """Begin at what projected Gauss-Seidel converges to."""
+        seen, own = self.seen, np.diag(self.seen.G)
+        fixed = {i: way for i, way in ways.items() if i not in self.stands}
+        lam = self._sweep(modes, fixed)
+        if lam is None:
+            return None
+        excess, found, ways = seen.G @ lam - seen.bare, dict(modes), dict(fixed)
+        for i in modes:
+            along = self._along(i)
+            size, bound = float(np.linalg.norm(lam[along])), self.sliding.bound(seen, lam, i)
+            if lam[seen.at[i]] * own[seen.at[i]] <= self.limit and i not in self.sliding.dry:
+                found[i] = Mode.FREE
+            elif i in self.stands and size < (1.0 - WITHIN) * bound:
+                found[i] = Mode.STICK
+            elif i in self.stands:
+                found[i], moved = Mode.SLIP, float(np.linalg.norm(excess[along]))
+                ways[i] = excess[along] / moved if moved > self.limit else -lam[along] / size
+        return self._pivoted(found, ways) or self._pivoted(found, ways, alone=True)
+
+    def _sweep(self, modes: Mapping[int, Mode], fixed: Mapping[int, Floats]) -> Floats | None:
+        """Forces by projected Gauss-Seidel; None where friction presses further in: it jams."""
+        seen, own, lam = self.seen, np.diag(self.seen.G), np.zeros(len(self.seen.rows))
+        for _ in range(SWEEPS):
+            before = lam.copy()
+            for i in modes:
+                k = seen.at[i]
+                if i not in self.sliding.dry:
+                    lam[k] = max(0.0, lam[k] + (seen.bare[k] - seen.G[k] @ lam) / own[k])
+                for row in self.sliding.tied.get(i, ()):
+                    c = seen.at[row]
+                    lam[c] += (seen.bare[c] - seen.G[c] @ lam) / own[c]
+                along, bound = self._along(i), self.sliding.bound(seen, lam, i)
+                if i in fixed:
+                    lam[along] = -bound * fixed[i]
+                elif along:
+                    step = lam[along] + (seen.bare[along] - seen.G[along] @ lam) / own[along].max()
+                    size = float(np.linalg.norm(step))
+                    lam[along] = step * (bound / size) if size > bound else step
+            if np.abs(lam - before).max() <= SETTLED * np.abs(lam).max():
+                break
+            if not np.abs(lam).max() < FAR * np.abs(seen.bare).max() / own[own > 0.0].min():
+                return None
+        return lam
