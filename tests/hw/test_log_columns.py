@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from log_files import STEADY
 
 from crossbody import hw
-from crossbody.cases import ColumnMapError, InvalidValue
+from crossbody.cases import ColumnMapError, InvalidValue, LogFormatError
 from crossbody.hw.reading.rows import Rows, join
 from crossbody.hw.reading.units import to_si
 
@@ -198,6 +198,23 @@ def test_a_unit_that_no_such_signal_has_is_refused(role: str, unit: str, says: s
     text = f'{GOOD}\n[{role}.{"q11" if role == "velocities" else "z"}]\ncolumn = "w"\nunit = "{unit}"\n'
     with pytest.raises(ValueError, match=says):
         hw.read(tmp_path / "log.csv", hw.parse_columns(text))
+
+
+@pytest.mark.parametrize(("unit", "step"), [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0)])
+def test_times_are_seconds_whatever_their_unit(unit: str, step: float, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,enc1\n" + "".join(f"{k},{k}\n" for k in range(20)))
+    text = f'[time]\ncolumn = "t"\nunit = "{unit}"\n[sensors.a]\ncolumn = "enc1"\nunit = "rad"\n'
+    np.testing.assert_allclose(hw.read(tmp_path / "log.csv", hw.parse_columns(text)).time, step * np.arange(20))
+
+
+@pytest.mark.parametrize("unit", ["m", "rad", "N m", "1/s", "deg", "m/s"])
+def test_times_in_what_is_no_unit_of_time_are_refused(unit: str, tmp_path: Path) -> None:
+    """Said by the map or by the file."""
+    for column, told in (("t", f'unit = "{unit}"\n'), (f"t [{unit}]", "")):
+        (tmp_path / "log.csv").write_text(f"{column},enc1\n" + "".join(f"{k},{k}\n" for k in range(20)))
+        text = f'[time]\ncolumn = "{column}"\n{told}[sensors.a]\ncolumn = "enc1"\nunit = "rad"\n'
+        with pytest.raises((LogFormatError, ColumnMapError), match="time"):
+            hw.read(tmp_path / "log.csv", hw.parse_columns(text))
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import G, box_on_floor, sphere_on_floor, stack
+from friction_scenes import G, box_on_floor, point, sphere_on_floor, stack
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
+from crossbody.reference import simulate
 from crossbody.reports import metrics
+from crossbody.reports.measuring import friction
 from crossbody.reports.measuring.friction import rubbing
 from crossbody.reports.measuring.truth import Truth, from_run
 
@@ -141,6 +143,18 @@ def test_places_of_one_pair_are_one_beside_pairs_without_friction() -> None:
     assert found is not None
     assert len(found.pair) == len(found.rows) > 1
     assert len(set(found.pair.tolist())) == 1
+
+
+@pytest.mark.parametrize("drift", [-0.7, 0.0, 0.3])
+def test_slip_is_counted_from_the_surface(drift: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point on a belt: it slips as fast as it is less the belt."""
+    system = point(0.2, 0.3, drift=drift)
+    run = simulate(system, [0.0, 0.0], [1.0, 0.0], 0.3)
+    monkeypatch.setattr(friction, "equations", lambda case: system)
+    found = rubbing(run, replace(CASE, scene=None))
+    assert found is not None
+    np.testing.assert_allclose(found.slip[:, 0, 0], run.v[:, 0] - drift, atol=1e-14)
+    np.testing.assert_array_equal(found.mu, 0.2)
 
 
 def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_path: Path) -> None:

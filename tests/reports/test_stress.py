@@ -331,6 +331,24 @@ def test_touches_that_are_over_at_once_leave_no_event_and_others_stay() -> None:
         assert lasting(replace(run, events=tuple(told))).events == tuple(right), seed
 
 
+def test_a_row_says_how_long_its_run_took(fake: Callable[..., Spec]) -> None:
+    def slow() -> Trajectory:
+        time.sleep(0.05)
+        return exact()
+
+    assert 50.0 <= execute(fake(slow))["wall_ms"] < 5e3
+    assert execute(fake(raised))["wall_ms"] == 0.0
+
+
+@pytest.mark.parametrize("second", [0, 1, 2, 3, 7])
+def test_the_independent_integrator_is_asked_of_every_so_many_draws(second: int) -> None:
+    family = replace(FAMILY, second=second)
+    asked = [scene.second for scene in draw.scenes("one", family, 0, 10, 0)]
+    assert sum(asked) == (math.ceil(10 / second) if second else 0)
+    assert asked[0] == (second > 0)
+    assert len({b - a for a, b in pairwise(np.flatnonzero(asked))}) <= 1
+
+
 def test_a_release_without_a_trace_in_the_motion_is_rounding_and_one_with_it_is_an_error(
     fake: Callable[..., Spec],
 ) -> None:
