@@ -43,7 +43,7 @@ def pendulum(length: float, above: bool, q0: float, t_end: float = 1.0) -> Case:
 
 
 @pytest.mark.parametrize("start", [1e-5, 1e-8, 0.0])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_errors_grow_as_the_closed_form_of_an_upright_pendulum_has_it(seed: int, start: float) -> None:
     """q'' = k^2 q: an error dv of the start becomes dv sinh(k T)/k, that of free flight dv T, also about a balance."""
     rng = np.random.default_rng(seed)
