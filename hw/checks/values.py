@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ CUT = 0.15  # of the way of the last 50 samples, in the last 10: 0.04 where a mo
 STEPS = 6  # of the encoder's grid: where a slow parabola turns on a grid, the last 10 samples cover less
 HALF = 0.5  # of the largest step: a channel that froze while it moved goes on with a jump
 RARE = 0.02  # of the steps: the first of a difference, a value of its own
+FINE = 1e-3  # steps are counted by their logarithms, to so much of them
 ROUNDING = 1e-9  # of the largest value: differences of counts that were written with 10 digits
 MOST = 8  # runs of a block that are looked at
 
@@ -109,7 +111,7 @@ class Runs:
         self.low, self.high = np.inf, -np.inf
         self.longest, self.jumped, self.top, self.bottom = Run(), Run(), Run(), Run()
         self.seen = 0
-        self._grid, self._largest = np.inf, 0.0  # steps
+        self._steps, self._largest, self._size = Counter[int](), 0.0, 0.0
         self._open = Run()
         self._value = np.nan
         self._tail: Floats = np.zeros(0)
@@ -121,7 +123,7 @@ class Runs:
 
     def cut_off(self, run: Run) -> bool:
         """Whether the motion did not come to rest by itself when the run began, or not by itself go on."""
-        return max(run.sharp, run.left if run.left > HALF * self._largest else 0.0) >= STEPS * self._grid
+        return max(run.sharp, run.left if run.left > HALF * self._largest else 0.0) >= STEPS * self._grid()
 
     def see(self, rows: Rows, times: Floats, values: Floats) -> None:
         """Take in the next block."""
@@ -134,8 +136,9 @@ class Runs:
         starts = np.flatnonzero(steps != 0.0)  # NaN differs from everything
         moved = steps[starts]
         moved = moved[np.isfinite(moved)]
-        self._look_for_grid(moved, float(np.abs(values).max()))
+        self._steps.update(np.floor(np.log(moved) / FINE).astype(int).tolist())
         self._largest = max(self._largest, float(moved.max(initial=0.0)))
+        self._size = max(self._size, float(np.abs(values).max()))
         head = int(starts[0]) if len(starts) else len(values)
         self._open.count += head
         if len(starts) and self.seen > len(values):
@@ -155,12 +158,16 @@ class Runs:
             self._value = float(values[-1])
         self._tail = whole[-FAR:]
 
-    def _look_for_grid(self, moved: Floats, largest: float) -> None:
-        """The smallest step, but for rare ones and for the rounding of what was computed from counts."""
-        steps = moved[moved > ROUNDING * largest]
-        rare = int(RARE * len(steps))
-        if len(steps) and (rare or self._grid == np.inf):
-            self._grid = min(self._grid, float(np.partition(steps, rare)[rare]))
+    def _grid(self) -> float:
+        """Return the smallest step, but for rare ones and for the rounding of what was computed from counts."""
+        least = np.log(max(ROUNDING * self._size, np.finfo(float).tiny)) / FINE
+        steps = sorted((place, count) for place, count in self._steps.items() if place > least)
+        rare = int(RARE * sum(count for _, count in steps))
+        for place, count in steps:
+            if count > rare:
+                return float(np.exp(FINE * place))
+            rare -= count
+        return np.inf
 
     @staticmethod
     def _entered(whole: Floats, at: int) -> Run:
