@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from xml.sax.saxutils import escape
 
@@ -21,11 +22,12 @@ import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator
 from scipy.interpolate import CubicHermiteSpline
 
 from crossbody import cases, engines
 from crossbody.cases import Mode, installed
-from crossbody.cases.contacts import contacts
+from crossbody.cases.contacts import contacts as touching
 
 DOCS = Path(__file__).parent
 FIGURES = DOCS / "figures"
@@ -96,6 +98,9 @@ def save(figure: plt.Figure, to: str | Path = "figure.svg") -> None:
     """Write a figure; the same file from the same numbers."""
     figure.savefig(to, metadata={"Date": None})
     plt.close(figure)
+    if Path(to).suffix == ".svg":  # hundredths of a point are enough, and nobody reads its text
+        text = re.sub(r"<!--.*?-->|(?<=\d\.\d\d)\d+|^ +", "", Path(to).read_text(encoding="utf-8"), flags=re.MULTILINE)
+        Path(to).write_text(re.sub(r"\n+", "\n", text), encoding="utf-8")
 
 
 def fine(run: cases.Trajectory, t: np.ndarray, k: int = 0) -> np.ndarray:
@@ -254,7 +259,7 @@ def metric() -> None:
         grid = np.linspace(0.0, run.t[-1], 500)
         height = fine(run, grid)
         (line,) = axes[0, 0].plot(grid, height, dash, label=f"{name}:{profile}")
-        rebound = float(np.max(height[grid > contacts(run)[0].touch]))
+        rebound = float(np.max(height[grid > touching(run)[0].touch]))
         axes[0, 0].axhline(rebound, color=line.get_color(), lw=0.8, ls=":")
     axes[0, 0].set(xlabel="time [s]", ylabel="height [m]")
     axes[0, 0].legend(frameon=False)
@@ -272,6 +277,83 @@ def work_precision() -> None:
         axes[0, 0].loglog(line["error"], line["median_ms"], "o-", label=f"{name}:{profile}", ms=4)
     axes[0, 0].set(xlabel="relative error of position and event times", ylabel="run time, median [ms]")
     axes[0, 0].legend(frameon=False)
+    save(figure)
+
+
+CLOSED_FORMS = (
+    "sliding_block:stops", "sliding_block:turns", "sliding_block:askew", "sliding_block:flat",
+    "rolling_sphere:straight", "rolling_sphere:side_spin", "block_on_belt:grazes", "dry_oscillator:swings",
+    "dry_oscillator:stops", "held_weight:slips", "stacked_blocks:apart", "rocking_block:falls",
+)  # fmt: skip
+"""Cases with friction whose motion is known exactly."""
+RUBBING = {
+    "reference:compiled": "", "reference:cvode": "sksundae", "mujoco:default": "mujoco", "pinocchio:admm": "pinocchio",
+    "dart:matched": "dartpy", "drake:matched": "pydrake",
+}  # fmt: skip
+"""Engines with friction, and what each needs."""
+
+
+STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)
+LONGEST = 0.3  # s: a ladder ends with a run that takes longer
+
+
+def off(run: cases.Trajectory, case: cases.Case) -> float:
+    """How far a run is from the exact motion at its own times, over the largest of each coordinate; places alone."""
+    names = [coordinate.name for coordinate in case.coordinates]
+    places = [k for k, name in enumerate(names) if name.split()[-1] not in ("qw", "qx", "qy", "qz")]
+    exact = case.closed_form(np.asarray(run.t)).q[:, places]
+    size = np.abs(exact).max(axis=0)
+    moves = size > 1e-6 * size.max()
+    return float((np.abs(run.q[:, places] - exact)[:, moves] / size[moves]).max())
+
+
+def ladder(case: cases.Case, engine: str, profile: str) -> np.ndarray:
+    """Settings from coarse to fine, errors, and run times in ms (m, 3)."""
+    found, one = [], engines.load(engine)
+    for knob, settings in (("rtol", 10.0 ** -np.arange(4, 13)), ("dt", STEPS)):
+        if knob not in one.prepare(case, profile).settings:
+            continue
+        for value in settings:
+            prepared = one.prepare(case, profile, **{knob: float(value)})
+            runs = [prepared.run() for _ in range(2)]
+            if not runs[0].outcome.ok:
+                break
+            found.append((value, max(off(runs[0], case), 1e-16), 1e3 * min(run.wall_s for run in runs)))
+            if runs[0].wall_s > LONGEST:
+                break
+    return np.array(found).reshape(-1, 3)
+
+
+@drawn
+def contacts() -> None:
+    """Error against step and against cost, beside the reference's: a closed form a pair of panels."""
+    rows = len(CLOSED_FORMS) // 2
+    figure, axes = plots(rows, 4, figsize=(10, 1.7 * rows), sharex="col", sharey=True)
+    for name, (step, cost) in zip(CLOSED_FORMS, axes.reshape(-1, 2), strict=True):
+        case = cases.load(*name.split(":"))
+        for k, (who, package) in enumerate(RUBBING.items()):
+            engine, profile = who.split(":")
+            if (package and find_spec(package) is None) or engines.load(engine).why_not(case, profile):
+                continue
+            setting, error, took = ladder(case, engine, profile).T
+            for panel, x in ((step, setting), (cost, took)):
+                panel.loglog(x, error, color=f"C{k}", lw=1.5, marker="." if len(x) == 1 else "", label=who)
+        step.set(title=name, ylim=(3e-17, 30.0))
+    for step, cost in axes[-1].reshape(-1, 2):
+        step.set(xlabel="step [s], or rtol")
+        cost.set(xlabel="run time [ms]")
+    for panel in axes.flat:
+        panel.minorticks_off()
+        panel.tick_params(bottom=False, left=False)
+        panel.grid(visible=False)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.xaxis.set_major_locator(LogLocator(numticks=4))
+        panel.yaxis.set_major_locator(LogLocator(numticks=5))
+        for axis in (panel.xaxis, panel.yaxis):
+            axis.set_major_formatter("{x:.0e}")
+    figure.supylabel("error of position, over the largest")
+    handles = {text: line for one in axes.flat for line, text in zip(*one.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=6, frameon=False)
     save(figure)
 
 
@@ -377,6 +459,7 @@ if __name__ == "__main__":
     mpl.rcParams |= {
         "svg.hashsalt": "crossbody",
         "svg.fonttype": "none",
+        "font.sans-serif": ["DejaVu Sans"],
         "font.size": 9.0,
         "path.simplify_threshold": 0.5,
     }
