@@ -20,8 +20,8 @@ NEAR = (0.7, 1.4)
 moves tenfold with the last digit; the largest of three does not."""
 
 
-def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations]]:
-    """What all engines that are installed give on one variant, and the largest of it near their tolerances."""
+def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations, float]]:
+    """What all engines that are installed give on one variant, the largest near their tolerances, and up to when."""
     (case,) = choice.load_cases([name], variant, {})
     wanted = choice.picks(engines.names())
     result = jobs.run_case(case, wanted, tell=print, refine=False)
@@ -37,7 +37,7 @@ def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviati
             for one in (one for one in beside.entries if one.run):
                 key = (one.engine, one.profile)
                 found[key] = _largest(found[key], measured(case, one, result.truth), _known(case, one))
-    return [(case, one, found[one.engine, one.profile]) for one in runs]
+    return [(case, one, found[one.engine, one.profile], result.truth.trusted) for one in runs]
 
 
 def _known(case: Case, entry: Entry) -> frozenset[str]:
