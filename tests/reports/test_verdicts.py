@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
@@ -18,13 +19,14 @@ from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports import metrics
 from crossbody.reports.commands import bands
-from crossbody.reports.judging import comparison
+from crossbody.reports.judging import comparison, stored
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.verdict import FACTOR, Regression, Word, band, exit_code, judge, limit_for
 from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.runs import jobs
 
 LIMIT = Limit(metric="position", value=1e-3, why="because")
 KNOWN = replace(LIMIT, known="it is known to do that", known_size=1.0)
@@ -518,3 +520,25 @@ def test_a_known_deviation_is_stored_as_the_run_has_it_and_anything_else_at_its_
     assert "start_error" not in known
     found = bands._largest({"a": 1.0, "b": 1.0, "c": 1.0}, {"a": 3.0, "b": 3.0}, frozenset({"a"}))
     assert found == {"a": 1.0, "b": 3.0, "c": 1.0}
+
+
+@pytest.mark.parametrize("behind", [1e-4, 1e-3, 1e-2])
+def test_what_is_stored_of_a_truth_that_ends_soon_after_an_event_judges_the_same_run(
+    behind: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Comparisons end between two events, so that their numbers can agree: not where the truth is no longer known."""
+    shipped = load("bouncing_ball", "linear")
+    whole = truth_of(shipped)
+    late = next(event.t for event in whole.trajectory.events if event.t > 0.6 * shipped.t_end)
+    truth = replace(whole, trusted=late + behind, allowed=1.0, agreement={"position": 0.0})
+    run = engines.load("reference").prepare(shipped, "compiled").run()
+    entry = Entry(engine="reference", profile="compiled", run=run)
+    result = jobs.CaseResult(case=shipped, truth=truth, entries=(entry,))
+    monkeypatch.setattr(stored, "FILE", tmp_path / "stored.json")
+    monkeypatch.setattr(jobs, "run_case", lambda *_, **__: result)
+    stored._table.cache_clear()
+    stored.write(bands._measured("bouncing_ball", "linear"))
+    rows = {each.metric: each for each in judged(shipped, [entry], truth, "")}
+    stored._table.cache_clear()
+    assert rows["position"].regression == Regression.KEPT
+    assert rows["truth"].regression == ""
