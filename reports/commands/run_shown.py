@@ -120,7 +120,8 @@ def _number(value: float | None) -> str:
 
 def _wrong(run: EngineRun, row: Row) -> str:
     number = f" {row['value']:.4g}{_unit(row)}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
-    return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}. {row['why']}"
+    place = f" ({row['where']})" if row.get("where") else ""
+    return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}{place}. {row['why']}"
 
 
 def _lost(run: EngineRun, row: Row) -> str:

@@ -394,7 +394,10 @@ def _row(
     needs = getattr(metric, "NEEDS", "")
     excused = value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
     if value is not None and not excused:
-        return judge_.judged(name, value, metric.UNIT, truth, compared)
+        found = judge_.judged(name, value, metric.UNIT, truth, compared)
+        place = getattr(metric, "where", None)
+        beyond = found.verdict != Word.WITHIN and math.isfinite(value) and value > found.limit
+        return replace(found, where=place(truth, run, judge_.case)) if place and beyond else found
     if name in judge_.claims:
         return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
     if wanted and _shown(metric, truth, judge_.case):
