@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -105,6 +107,31 @@ def test_sensors_delay_and_round() -> None:
     np.testing.assert_allclose(slow[:, 0], exact[::50], atol=1e-4)
     with pytest.raises(InvalidValue, match="rate is -1"):
         Sensor(rate=-1.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_late_sensor_shows_what_was_true_and_before_that_the_start(seed: int) -> None:
+    """Held or cubic between samples of any distance; rounded to its counts, or following by its lag."""
+    random = np.random.default_rng(seed)
+    t = random.uniform(-3.0, 3.0) + np.cumsum(random.uniform(0.5, 1.5, 60)) * 0.01
+    lines = [np.polynomial.Polynomial(c, domain=[t[0], t[-1]]) for c in random.normal(size=(2, 4))]
+    x, xd = (np.column_stack([line(t) for line in each]) for each in (lines, [line.deriv() for line in lines]))
+    delay, quantum, ks = random.uniform(0.005, 0.1), random.uniform(0.01, 0.2), random.uniform(20.0, 200.0)
+    then = np.maximum(t - delay, t[0])
+    last = [max(i for i in range(len(t)) if t[i] <= at) for at in then]
+    np.testing.assert_array_equal(Sensor(delay=delay).read(t, x), x[last])
+    smooth = Sensor(delay=delay).read(t, x, xd)
+    np.testing.assert_allclose(smooth, np.column_stack([line(then) for line in lines]), atol=1e-10)
+    rounded = Sensor(delay=delay, quantum=quantum).read(t, x, xd)
+    np.testing.assert_allclose(rounded / quantum, np.round(smooth / quantum), atol=1e-9)
+    for rate in (None, xd):
+        fine = np.concatenate([np.linspace(a, b, 200, endpoint=False) for a, b in pairwise(t)])
+        k = np.searchsorted(t, fine, side="right") - 1
+        share = 0.0 if rate is None else ((fine - t[k]) / (t[k + 1] - t[k]))[:, None]
+        felt_, y = x[k] + share * (x[k + 1] - x[k]), [x[0]]
+        for step, now in zip(np.diff(np.append(fine, t[-1])), felt_, strict=True):
+            y.append(y[-1] + (1.0 - np.exp(-ks * step)) * (now - y[-1]))
+        np.testing.assert_allclose(Sensor(rate=ks).read(t, x, rate), y[::200], atol=1e-3)
 
 
 def test_polynomials_give_rates_and_say_how_noisy_they_are() -> None:
