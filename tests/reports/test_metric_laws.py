@@ -17,6 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.multipliers import told
 from crossbody.reports.measuring.truth import Truth
 
 CASES = [
@@ -309,3 +310,20 @@ def test_all_that_is_beside_a_truth_is_measured_of_every_run() -> None:
     assert asked == {name for name, (module, _) in metrics._of_runs().items() if module == "_of_run"} | {
         "violated_modes"
     }
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_multiplier_is_known_or_follows_from_others_of_rows_that_are_always_on(seed: int) -> None:
+    """Of a row that opens, and at some samples alone, it is unknown."""
+    random, n, rows = np.random.default_rng(seed), 5, int(np.random.default_rng(seed).integers(1, 4))
+    on, lacking, partly = (random.random(rows) < share for share in (0.6, 0.4, 0.1))
+    lam, mode = random.normal(size=(n, rows)), np.full((n, rows), Mode.CONTACT, np.int8)
+    mode[:, on] = Mode.BILATERAL
+    lam[:, lacking] = np.nan
+    lam[2, partly] = np.nan
+    wide = np.zeros((n, rows))
+    run = Trajectory(t=np.arange(n) * 1.0, q=wide, v=wide, gap=wide, lam=lam, energy=np.zeros((n, 2)), mode=mode)
+    follows = [bool(on[k] and lacking[k]) for k in range(rows)]
+    unknown = any((lacking[k] or partly[k]) and not follows[k] for k in range(rows)) or all(follows)
+    found = told(run)
+    assert (found is None) if unknown else (found is not None and found.tolist() == [not f for f in follows])

@@ -32,8 +32,9 @@ CASES = (
 
 
 def states(case: Case, n: int = 5) -> np.ndarray:
+    """Near the start and, more and more, far from it: a radian."""
     rng = np.random.default_rng(3)
-    return case.q0 + 1e-3 * rng.standard_normal((n, len(case.q0)))
+    return case.q0 + np.geomspace(1e-3, 1.0, n)[:, None] * rng.standard_normal((n, len(case.q0)))
 
 
 def trace_of(case: Case, n: int = 50) -> Trace:
@@ -83,7 +84,9 @@ def test_balls_are_as_far_apart_as_their_gap(variant: str) -> None:
     q = states(case)
     centres = scenes.load(case.mechanism).poses(q, case.parameters)[:, :, :2]
     apart = np.linalg.norm(np.diff(centres, axis=1), axis=2) - 2 * case.number("radius")
-    assert np.allclose(apart, gaps(case, q), atol=1e-13)
+    in_order = (np.diff(centres[:, :, 0], axis=1) > 0.0).all(axis=1) | (variant == "pendulums")  # on one line
+    assert in_order.sum() >= 3
+    assert np.allclose(apart[in_order], gaps(case, q)[in_order], atol=1e-13)
 
 
 def test_forces_of_a_pair_are_opposite() -> None:
