@@ -190,3 +190,31 @@ def test_times_in_pure_numbers_are_refused(tmp_path: Path) -> None:
     text = 'options = {units = true}\n[time]\ncolumn = "t"\n[sensors.q]\ncolumn = "q"\n'
     with pytest.raises(LogFormatError, match=r"measures \[1\], not time"):
         hw.read(tmp_path / "log.csv", hw.parse_columns(text))
+
+
+@pytest.mark.parametrize("rate", [0.4, 2.3])
+@pytest.mark.parametrize("how", ["hold", "linear"])
+def test_an_angle_that_joins_a_log_from_other_rows_goes_on_over_a_turn_or_is_refused(
+    how: str, rate: float, tmp_path: Path
+) -> None:
+    """Between the two sides of a wrap nothing lies: a straight line between them passes angles that never were."""
+    from scipy.io import savemat
+
+    t = np.arange(1000) * 1e-3
+    own = np.linspace(t[0] - 2e-3, t[-1] + 3e-3, int(rate * len(t)))
+    way = 0.3 + 9.0 * np.sin(3.0 * own)
+    wrapped = np.mod(way + np.pi, 2.0 * np.pi) - np.pi
+    savemat(tmp_path / "log.mat", {"t": t, "u": np.cos(t), "own": own, "angle": wrapped})
+    columns = hw.parse_columns(
+        f'join = "{how}"\n[time]\ncolumn = "t"\n[sensors.u]\ncolumn = "u"\nunit = "1"\n'
+        '[coordinates.q]\ncolumn = "angle"\nunit = "rad"\ntime = "own"\n'
+    )
+    with pytest.raises(LogFormatError, match="wraps at a turn"):
+        hw.read(tmp_path / "log.mat", columns)
+    log = hw.read(tmp_path / "log.mat", columns, repair=("unwrap",))
+    last = np.searchsorted(own, t, side="right") - 1
+    wanted = way[last] if how == "hold" else np.interp(t, own, way)
+    np.testing.assert_allclose(log.channel("coordinates", "q").values, wanted, atol=1e-9)
+    (told,) = log.provenance.repairs
+    wraps = np.flatnonzero(np.abs(np.diff(wrapped)) > np.pi) + 1
+    assert (told.name, told.rows, told.row, told.t) == ("unwrap", len(wraps), wraps[0], pytest.approx(own[wraps[0]]))

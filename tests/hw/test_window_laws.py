@@ -11,7 +11,7 @@ from scipy.linalg import expm, logm
 
 from crossbody import hw
 from crossbody.cases import SceneError
-from crossbody.hw.windows.rates import derivatives
+from crossbody.hw.windows.rates import derivatives, rates_by_fit
 from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way
 from crossbody.hw.windows.window import FEWEST, overlap, windows
 
@@ -133,3 +133,15 @@ def test_turns_among_other_coordinates_are_those_of_rotation_matrices(seed: int)
         (way(first, at), ways), (advanced(first[0], other[0], delay, at), later),
     ):  # fmt: skip
         np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+def test_a_bend_that_no_single_sample_shows_is_not_smoothed_over() -> None:
+    """Its rate jumps by 1.5 noises a sample: over 51 samples the squares tell it, and each is within three noises."""
+    t, errors = np.arange(400.0), []
+    bend, rows = 1.5 * np.maximum(t - 200.0, 0.0), np.array([196, 204])
+    for seed in range(60):
+        noise = np.random.default_rng(seed).standard_normal(400)
+        errors.append(np.abs(rates_by_fit(t, (bend + noise)[:, None], rows)[:, 0] - [0.0, 1.5]))
+    across = [np.polyval(np.polyder(np.polyfit(t[:51] - 25.0, bend[row - 25 : row + 26], 3)), 0.0) for row in rows]
+    smoothed = np.abs(np.array(across) - [0.0, 1.5])
+    assert np.all(np.mean(errors, axis=0) < 0.8 * smoothed)
