@@ -92,7 +92,7 @@ def test_the_noise_of_steps_is_that_of_the_samples_whatever_parabola_they_move_o
 def planted(random: np.random.Generator, kind: str, rows: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A smooth motion with jumps of a kind at random distances: its values, where they are, and their sizes."""
     at = np.cumsum(random.integers(70, 240, rows // 70))
-    at = at[at < rows - 40]
+    at = at[(at < rows - 40) & (at > random.integers(0, 0.7 * rows))]
     signs = random.choice([-1.0, 1.0], len(at))
     sizes = signs * (2.0 * np.pi if kind == "wraps" else random.uniform(0.5, 1.5, len(at)))
     values = np.sin(6.0 * np.arange(rows) / rows) + 1e-5 * random.standard_normal(rows)

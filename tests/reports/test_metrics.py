@@ -133,6 +133,22 @@ def test_energy_made_by_the_law_is_the_gain_of_every_bounce() -> None:
     assert measure("energy_integrator", truth, truth.trajectory, case) < 1e-12
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.4, 0.9])
+def test_energy_of_switching_is_all_that_a_row_of_balls_gains_without_damping(gap: float) -> None:
+    """Of constant mass and rows, once nothing pushes any more."""
+    plain = load("newtons_cradle", "sliders", n=3, zeta=0.0)
+    case = load(
+        "newtons_cradle", "sliders", n=3, zeta=0.0, collisions="resolved", t_end=2.0 * plain.t_end,
+        gap=gap * plain.number("speed") / np.sqrt(plain.number("a0")),
+    )  # fmt: skip
+    truth = truth_of(case)
+    energy = truth.trajectory.total_energy
+    gained = (energy[-1] - energy[0]) / truth.trajectory.energy[:, 0].max()
+    assert (gained > 0.01) or gap == 0.0
+    assert measure("energy_switching", truth, truth.trajectory, case) == pytest.approx(gained, abs=1e-7)
+    assert measure("energy_switching_error", truth, truth.trajectory, case) == pytest.approx(0.0, abs=1e-7)
+
+
 def test_without_a_ledger_nothing_is_said_of_it(truth: Truth, case: Case) -> None:
     run = replace(truth.trajectory, ledger=None)
     assert np.isnan(measure("energy_law", truth, run, case))
