@@ -165,7 +165,7 @@ def test_what_is_written_is_read_in_si_whatever_the_layout(
 @pytest.mark.parametrize("clock", [True, False])
 def test_a_draft_reads_what_was_surveyed(clock: bool, tmp_path: Path) -> None:
     """All columns but the times; where there are none, rows are counted and the draft says that it does not know."""
-    random, names = np.random.default_rng(3), ["angle", "torque", "rate", "force"]
+    random, names = np.random.default_rng(3), ["angle [zork]", "torque", "rate", "force"]
     data = random.normal(size=(50, 4))
     t = np.arange(50) * 0.25
     table = np.column_stack([t, data]) if clock else data
@@ -218,3 +218,15 @@ def test_an_angle_that_joins_a_log_from_other_rows_goes_on_over_a_turn_or_is_ref
     (told,) = log.provenance.repairs
     wraps = np.flatnonzero(np.abs(np.diff(wrapped)) > np.pi) + 1
     assert (told.name, told.rows, told.row, told.t) == ("unwrap", len(wraps), wraps[0], pytest.approx(own[wraps[0]]))
+
+
+def test_what_a_map_does_not_say_changes_nothing(tmp_path: Path) -> None:
+    t, x = np.arange(50) * 0.125, np.random.default_rng(0).normal(size=50)
+    np.savetxt(tmp_path / "log.csv", np.column_stack([t, x]), "%.17g", delimiter=",", header="t,x", comments="")
+    columns = hw.parse_columns('[time]\ncolumn = "t"\n[sensors.x]\ncolumn = "x"\nunit = "rad"\n')
+    log = hw.read(tmp_path / "log.csv", columns)
+    channel = log.channel("sensors", "x")
+    assert (log.time.tobytes(), channel.values.tobytes()) == (t.tobytes(), x.tobytes())
+    assert log.times("sensors", "x").tobytes() == t.tobytes()
+    assert (channel.delay, channel.range, log.sample_time) == (0.0, None, 0.125)
+    assert (log.provenance.repairs, log.provenance.origin, log.provenance.part, log.filled.size) == ((), 0, None, 0)

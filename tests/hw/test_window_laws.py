@@ -7,12 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from rig_data import channels, log_of
-from scipy.linalg import expm, logm
 
 from crossbody import hw
 from crossbody.cases import SceneError
 from crossbody.hw.windows.rates import derivatives, rates_by_fit
 from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way
+from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
 from crossbody.hw.windows.window import FEWEST, overlap, windows
 
 STEP = 0.01
@@ -98,13 +98,17 @@ def test_polynomials_are_their_own_value_rate_and_acceleration(half: int, degree
 
 
 def turned(vector: np.ndarray) -> np.ndarray:
-    x, y, z = vector
-    return expm(np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]))
+    """The matrix of a rotation vector, by Rodrigues."""
+    angle = np.linalg.norm(vector)
+    x, y, z = vector / angle
+    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
 
 
 def about(turn: np.ndarray) -> np.ndarray:
-    """The rotation vector of a rotation matrix that is no half turn."""
-    skew = np.real(logm(turn))
+    """The rotation vector of a matrix that is neither no turn nor half a turn."""
+    angle = np.arccos(0.5 * (np.trace(turn) - 1.0))
+    skew = angle / (2.0 * np.sin(angle)) * (turn - turn.T)
     return np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
 
 
@@ -132,7 +136,7 @@ def test_turns_among_other_coordinates_are_those_of_rotation_matrices(seed: int)
         (difference(first, other, at), off), (deviation(first, at), spread), (increments(first, at), steps),
         (way(first, at), ways), (advanced(first[0], other[0], delay, at), later),
     ):  # fmt: skip
-        np.testing.assert_allclose(found, wanted, atol=1e-9)
+        np.testing.assert_allclose(found, wanted, atol=1e-7)
 
 
 def test_a_bend_that_no_single_sample_shows_is_not_smoothed_over() -> None:
@@ -145,3 +149,22 @@ def test_a_bend_that_no_single_sample_shows_is_not_smoothed_over() -> None:
     across = [np.polyval(np.polyder(np.polyfit(t[:51] - 25.0, bend[row - 25 : row + 26], 3)), 0.0) for row in rows]
     smoothed = np.abs(np.array(across) - [0.0, 1.5])
     assert np.all(np.mean(errors, axis=0) < 0.8 * smoothed)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_correlations_are_sums_of_products_inside_windows(seed: int) -> None:
+    """Of what is left of the mean of all; of an input, with the sign of its effect at the lag at which it acts."""
+    random = np.random.default_rng(seed)
+    pieces = [random.normal(loc=0.7, size=n) for n in (30, 41, 57)]
+    lags, x = 6, [piece - np.mean(np.concatenate(pieces)) for piece in pieces]
+    wanted = [sum(sum(p[i + k] * p[i] for i in range(len(p) - k)) for p in x) for k in range(lags + 1)]
+    found = autocorrelation(pieces, lags)
+    assert found.lags.tolist() == list(range(lags + 1))
+    np.testing.assert_allclose(found.values, np.array(wanted) / wanted[0], atol=1e-12)
+    assert found.band == pytest.approx(2.576 / np.sqrt(128.0), rel=1e-4)
+    late, gain = int(random.integers(0, 5)), float(random.choice([-0.8, 0.8]))
+    inputs = [random.normal(size=400) for _ in range(3)]
+    felt = [gain * np.roll(u, late) + 0.6 * random.normal(size=400) for u in inputs]
+    beside = crosscorrelation(felt, inputs, 8)
+    assert beside.values[beside.lags == late] == pytest.approx(gain, abs=0.1)
+    assert np.abs(beside.values[beside.lags != late]).max() < 0.2
