@@ -230,3 +230,23 @@ def test_what_a_map_does_not_say_changes_nothing(tmp_path: Path) -> None:
     assert log.times("sensors", "x").tobytes() == t.tobytes()
     assert (channel.delay, channel.range, log.sample_time) == (0.0, None, 0.125)
     assert (log.provenance.repairs, log.provenance.origin, log.provenance.part, log.filled.size) == ((), 0, None, 0)
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_draft_begins_with_the_rows_that_have_times_then_with_those_of_most_numbers(
+    timed: bool, tmp_path: Path
+) -> None:
+    """What has times in another unit, or none, is left out; faults are told before what is doubtful."""
+    from scipy.io import savemat
+
+    few, many = ({f"{name}{n}": np.random.default_rng(n).normal(size=n) for name in ("a", "b")} for n in (30, 90))
+    few["a30"][20] = np.nan
+    if timed:
+        few["t"] = np.arange(30) * 0.1 + 5.0 * (np.arange(30) >= 10)
+    savemat(tmp_path / "log.mat", few | many)
+    found = hw.survey(tmp_path / "log.mat")
+    assert [(group.rows, len(group.columns)) for group in found.groups] == [(30, 2 + timed), (90, 2)]
+    read = {signal.column for _, _, signal in found.draft().signals()}
+    assert read == ({"a30", "b30"} if timed else {"a90", "b90"})
+    told = [(finding.check, finding.fault, finding.row) for finding in found.findings]
+    assert told == [("finite", True, 20), ("dropped", False, 10)][: 1 + timed]
