@@ -220,10 +220,17 @@ def _known(case: Case, solver: str) -> dict[str, Parameter]:
 
 def _off(case: Case, error: OffRowsError) -> str:
     """Return what is wrong with the start of a file and what its user can do, in the file's names."""
-    advice = f"--set assemble=1 starts in every engine at the nearest that is on them: {error.near}."
+    advice = NOT_FOUND
+    if error.near is not None:
+        moved = np.abs(error.near[0] - case.q0)
+        most = int(np.argmax(moved))
+        advice = (
+            "--set assemble=1 starts in every engine at the nearest that is on them, which moves "
+            f"{case.coordinates[most].name!r} by {moved[most]:.3g} and no other coordinate further."
+        )
     return (
         f"{case.label}: the start is off {case.contacts[error.row]!r}, which is always on: {error.off}. "
-        f"{advice if error.near else NOT_FOUND} --without loops leaves such rows out of every engine."
+        f"{advice} --without loops leaves such rows out of every engine."
     )
 
 

@@ -32,12 +32,15 @@ class OffRowsError(SceneError):
     Attributes:
         row: which.
         off: what its gap and its rate are.
-        near: the nearest start on all such rows, as text; empty if none was found.
+        near: positions (nq,) and velocities (n,) of the nearest start on all such rows; None if none was found.
     """
 
-    def __init__(self, run: str, row: int, off: str, near: str) -> None:
+    def __init__(self, run: str, row: int, off: str, near: tuple[Floats, Floats] | None) -> None:
         self.row, self.off, self.near = row, off, near
-        offered = f"The nearest on all such rows is {near} (System.project)." if near else NOT_FOUND
+        offered = NOT_FOUND
+        if near is not None:
+            q0, v0 = (part.tolist() for part in near)
+            offered = f"The nearest on all such rows is q0 = {q0}, v0 = {v0} (System.project)."
         super().__init__(
             f"The start{run} is off row {row}, which is always on: {off}. {offered} "
             "consistent=False admits a start that is off its rows on purpose."
@@ -69,7 +72,7 @@ def check_start(
     if np.any(off):
         i = int(held[np.argmax(off)])
         rate = f"h = {state.h[i]:.6g} and h' = {state.H[i] @ v:.6g}, more than rtol = {options.rtol:g} explains"
-        raise OffRowsError(run, i, rate, _shown(_projected(state, held)))
+        raise OffRowsError(run, i, rate, _projected(state, held))
 
 
 def check_starts(system: System, starts: Floats, parameters: Floats, options: Options) -> None:
@@ -91,10 +94,6 @@ def project(system: System, q: Floats, v: Floats) -> tuple[Floats, Floats]:
     if found is None:
         raise SceneError(f"No state on the rows that are always on is found from q = {q.tolist()}, v = {v.tolist()}.")
     return found
-
-
-def _shown(near: tuple[Floats, Floats] | None) -> str:
-    return "" if near is None else f"q0 = {near[0].tolist()}, v0 = {near[1].tolist()}"
 
 
 def _may_hold(system: System) -> NDArray[np.bool_]:

@@ -124,6 +124,8 @@ def _wrong(run: EngineRun, row: Row) -> str:
 
 
 def _lost(run: EngineRun, row: Row) -> str:
+    if math.isnan(row["band"]):
+        return f"worse than the stored run: {run.label} {row['metric']}. {row['why']}"
     expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
     value = f"{abs(row['value'] - expected):.4g}{_unit(row)} from what is claimed, band {row['band']:.3g}"
     return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"
