@@ -10,6 +10,7 @@ import pytest
 from crossbody.cases import InvalidValue
 from crossbody.hw import Sensor, unlagged
 from crossbody.hw.replaying import measures as _measures
+from crossbody.hw.replaying import tracked
 from crossbody.hw.replaying.sensors import lagged
 from crossbody.hw.windows.impacts import Impacts, impacts, least_of, matched
 from crossbody.hw.windows.rates import derivatives, felt
@@ -203,3 +204,17 @@ def test_the_instant_and_the_jump_of_an_impact_are_known_between_samples(seed: i
     found = impacts(t, y, least=1e-3)
     np.testing.assert_allclose(found.t, when, atol=1e-12)
     np.testing.assert_allclose(found.jump, jumps, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_means_of_held_inputs_are_those_of_any_instants(seed: int) -> None:
+    """From each to the next, the last as long as the one before; beyond its own times an input holds."""
+    random = np.random.default_rng(seed)
+    times = random.uniform(-1.0, 1.0) + np.cumsum(random.uniform(0.01, 0.1, 30))
+    held = random.normal(size=(30, 2))
+    t = np.sort(random.uniform(times[0] - 0.1, times[-1] + 0.1, 12))
+    found = tracked._means(times, held, t)
+    for i, (a, b) in enumerate(pairwise([*t, 2.0 * t[-1] - t[-2]])):
+        cuts = np.unique([a, b, *times[(times > a) & (times < b)]])
+        now = [held[max(int(np.sum(times <= at)) - 1, 0)] for at in cuts[:-1]]
+        np.testing.assert_allclose(found[i], np.diff(cuts) @ np.array(now) / (b - a), atol=1e-12)
