@@ -317,6 +317,28 @@ def test_the_worst_sample_of_friction_counts(name: str, parts: tuple[float, floa
     assert found({first: parts[0], middle: parts[1]}) == pytest.approx(worst)
 
 
+@pytest.mark.parametrize("signal", ["q", "v"])
+@pytest.mark.parametrize("name", ["energy_residual", "gap_residual", "law_residual", "rate_residual", "position"])
+def test_one_state_that_is_no_number_leaves_none(name: str, signal: str, truth: Truth, case: Case) -> None:
+    """Among more samples than are looked at."""
+    run = truth.trajectory
+    assert len(run.t) > 1000
+    for k in np.random.default_rng(6).integers(1, len(run.t), 5):
+        values = getattr(run, signal).copy()
+        values[k] = np.nan
+        if (name, signal) != ("position", "v"):
+            assert np.isnan(measure(name, truth, replace(run, **{signal: values}), case))
+
+
+@pytest.mark.parametrize("level", [-3e6, 3e6])
+def test_an_energy_is_measured_by_no_less_than_rounding_leaves_of_it(level: float, truth: Truth) -> None:
+    run = truth.trajectory
+    still = replace(
+        run, q=np.ones_like(run.q), energy=np.full_like(run.energy, (0.0, level)), lam=np.zeros_like(run.lam)
+    )  # fmt: skip
+    assert scale.energy(still) == pytest.approx(1e-8 * 3e6)
+
+
 @pytest.mark.parametrize("part", [0.05, 0.5, 0.95])
 @pytest.mark.parametrize("name", ["lam_impulse", "lam_impulse_path"])
 def test_an_impulse_counts_whenever_it_acts(name: str, part: float, truth: Truth, case: Case) -> None:
