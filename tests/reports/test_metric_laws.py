@@ -265,6 +265,13 @@ def test_instants_and_numbers_of_contacts_are_matched_in_order(one: Drawn) -> No
         shifts = [abs(float(one.late(t)) - t) for t in known]
         found = metrics.load("event_times").measure(replace(one.truth, trusted=until), one.run, one.case)
         assert found == (pytest.approx(max(shifts), rel=1e-9) if shifts else None)
+    if pairs:  # one that does not end in the run has no shift, and is counted
+        ends = max(k for k, e in enumerate(one.run.events) if e.before == Mode.CONTACT)
+        held = replace(one.run, events=tuple(e for k, e in enumerate(one.run.events) if k != ends))
+        kept = [t for a, b in pairs if a.t <= one.truth.trusted for t in (a.t, b.t)][:-1]
+        shifts = [abs(float(one.late(t)) - t) for t in kept]
+        assert metrics.load("event_times").measure(one.truth, held, one.case) == pytest.approx(max(shifts), rel=1e-9)
+        assert metrics.load("release_count").measure(one.truth, held, one.case) == -1
     lacking = replace(one.run, events=one.run.events[2:])
     for run, number in ((one.run, 0), (lacking, -1)):
         if pairs:
