@@ -197,3 +197,18 @@ def test_what_is_said_of_a_channel_is_said_of_it_with_the_other_sign(seed: int) 
     assert said(JumpCheck("x", "rad"), x) == said(JumpCheck("x", "rad"), -x)
     v = np.gradient(x, t) * random.choice([1.0, 1.2]) + random.choice([0.0, 0.5])
     assert said(RateCheck("x"), x, v) == said(RateCheck("x"), -x, -v)
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+@pytest.mark.parametrize("seed", range(6))
+def test_single_counts_of_an_encoder_are_no_jumps(seed: int, way: float) -> None:
+    """Of a motion so slow that it stands still for many samples between two of them."""
+    random = np.random.default_rng([seed, 6])
+    grid, t = 10.0 ** random.uniform(-5.0, -2.0), np.arange(3000) * 1e-3
+    counts = np.rint(way * t * random.uniform(5.0, 60.0) + random.random())
+    found = find_jumps(t, grid * counts, True)[0]
+    assert not len(found.at)
+    counts[1500:] += way * 9.0
+    found = find_jumps(t, grid * counts, True)[0]
+    (at,) = found.at.tolist()  # a count of its own just before is the beginning of a slip over some samples
+    assert 1492 <= at <= 1500

@@ -218,3 +218,16 @@ def test_means_of_held_inputs_are_those_of_any_instants(seed: int) -> None:
         cuts = np.unique([a, b, *times[(times > a) & (times < b)]])
         now = [held[max(int(np.sum(times <= at)) - 1, 0)] for at in cuts[:-1]]
         np.testing.assert_allclose(found[i], np.diff(cuts) @ np.array(now) / (b - a), atol=1e-12)
+
+
+@pytest.mark.parametrize("pull", [-9.81, 0.0, 4.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_no_noise_and_no_weight_is_an_impact(seed: int, pull: float) -> None:
+    """Six deviations of the second differences, whose variance is six times that of a sample; or a part of the blow."""
+    random, t = np.random.default_rng(seed), STEP * np.arange(2000)
+    noise = 10.0 ** random.uniform(-8.0, -5.0)
+    y = 0.5 * pull * t**2 + noise * random.normal(size=len(t))
+    clear = 6.0 * np.sqrt(6.0) * noise / STEP**2
+    assert least_of(t, y) == pytest.approx(max(clear, 0.25 * pull), rel=0.1)
+    hit = 100.0 * clear
+    assert least_of(t, y + hit * STEP * np.maximum(t - t[900], 0.0)) == pytest.approx(0.25 * (hit + pull), rel=0.1)
