@@ -159,6 +159,22 @@ def test_a_gain_a_delay_and_a_bias_of_a_rate_are_told_in_their_size(seed: int) -
     assert (found.check, figure(found.text, "biased by")) == ("bias", pytest.approx(bias, rel=1e-2))
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_gain_is_as_unsure_as_least_squares_leave_it(seed: int) -> None:
+    """Twice its standard error is told, of all spans of sixteen samples but the few that are unusual."""
+    random, t = np.random.default_rng([seed, 7]), np.arange(4001) * 1e-3
+    phase, noise = random.random(), 10.0 ** random.uniform(-3.0, -1.5)
+    q = 1.1 * np.sin(9.0 * t + phase) + noise * random.standard_normal(len(t))
+    v = 9.0 * np.cos(9.0 * t + phase)
+    (found,) = shown(RateCheck("arm"), random, t, q, v)
+    way = np.append(0.0, np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t)))
+    X, dq = np.column_stack([np.diff(way[::16]), np.diff(v[::16])]), np.diff(q[::16])
+    left = dq - X @ np.linalg.lstsq(X, dq, rcond=None)[0]
+    error = np.sqrt(np.linalg.inv(X.T @ X)[0, 0] * (left @ left) / (len(dq) - 2))
+    assert found.check == "gain"
+    assert figure(found.text, "+-") == pytest.approx(2.0 * error, rel=0.1)
+
+
 @pytest.mark.parametrize("high", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("low", [-1.0, 0.0, 0.25])
 def test_a_switch_has_the_values_0_and_1_alone(low: float, high: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Ledger, Mode, Tier, Trajectory, load
+from crossbody.cases import Case, Event, Ledger, Mode, Tier, Trajectory, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
@@ -328,6 +328,17 @@ def test_one_state_that_is_no_number_leaves_none(name: str, signal: str, truth: 
         values[k] = np.nan
         if (name, signal) != ("position", "v"):
             assert np.isnan(measure(name, truth, replace(run, **{signal: values}), case))
+
+
+def test_a_start_in_contact_is_no_touch_that_is_off_its_surface(truth: Truth, case: Case) -> None:
+    run = truth.trajectory
+    begun = (Event(t=0.0, contact=0, before=Mode.FREE, after=Mode.CONTACT), *run.events)
+    assert run.gap[0, 0] > 0.5
+    assert (
+        measure("event_gap", truth, replace(run, events=begun), case) == measure("event_gap", truth, run, case) < 1e-6
+    )
+    later = tuple(replace(e, t=0.01 * case.t_end) for e in begun)
+    assert measure("event_gap", truth, replace(run, events=later), case) > 1.0
 
 
 @pytest.mark.parametrize("level", [-3e6, 3e6])
