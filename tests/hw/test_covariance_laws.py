@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, toeplitz
 
+from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Layout, noise_correlation, scatter
 
 LAYOUTS = (
@@ -68,3 +69,25 @@ def test_estimates_scatter_together_as_the_noise_goes_through_their_weights(layo
         np.testing.assert_allclose(
             found.covariance / np.outer(found.std, found.std), whole / np.outer(size, size), rtol=1e-6
         )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_halves_are_compared_in_what_both_of_them_tell(seed: int) -> None:
+    """Not in what one of them does not see, or sees of two together alone."""
+    random, layout, names = np.random.default_rng(seed), Layout(samples=(40,) * 10, k=1), tuple("abcde")
+    J = random.normal(size=(400, 5))
+    late = layout.windows() >= 5
+    place = random.permutation(5)
+    unseen, one, other = place[:3]
+    J[late, unseen] = 0.0
+    J[~late, other] = J[~late, one]
+    residual = random.normal(size=400)
+    residual -= J @ np.linalg.lstsq(J, residual, rcond=None)[0]
+    found = agreement(J, residual, layout, np.zeros(5), np.ones(5), names, ())
+    assert [half.name for half in found] == [names[i] for i in sorted(place[3:])]
+    for half in found:
+        i = names.index(half.name)
+        for rows, value, std in zip((~late, late), half.values, half.stds, strict=True):
+            weights = np.linalg.pinv(J[rows])
+            assert value == pytest.approx((weights @ residual[rows])[i], abs=1e-9)
+            assert std == pytest.approx(np.linalg.norm(weights[i]), rel=0.5)  # of noise of size 1
