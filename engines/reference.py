@@ -206,7 +206,7 @@ def _known(case: Case, solver: str) -> dict[str, Parameter]:
         "samples": Parameter(default=0, doc="number of equidistant rows; 0 for every step", low=0, high=1e8),
         "fsm": Parameter(default=OF_THE_CASE, doc="state machine", choices=(OF_THE_CASE, *FSMS)),
         "max_steps": Parameter(default=1_000_000, doc="bound on the number of steps", low=1, high=1e12),
-        "time_limit": Parameter(default=3600.0, unit="s", doc="bound on wall time", low=0.0, open_low=True),
+        "time_limit": Parameter(default=3600.0, unit="s", doc="bound on processor time", low=0.0, open_low=True),
     }
     if solver == "compiled":
         known["shortcuts"] = Parameter(default=True, doc="closed-form arcs where the scene is affine", low=0, high=1)

@@ -75,8 +75,8 @@ class Options:
         index: 1, or 3 for bilateral rows under "ida".
         max_step: longest step, s.
         max_steps: bound on steps.
-        time_limit: bound on wall time, s; looked at between slices of steps. It does not end a kernel that never
-            returns: only its process can be ended, as the command line does.
+        time_limit: bound on processor time, s, and ten times as long by the clock; looked at between slices of steps.
+            It does not end a kernel that never returns: only its process can be ended, as the command line does.
     """
 
     t_end: float
