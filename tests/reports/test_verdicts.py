@@ -27,6 +27,7 @@ from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.verdict import FACTOR, Regression, Word, band, exit_code, judge, limit_for
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs import jobs
+from crossbody.reports.runs.choice import picks
 
 LIMIT = Limit(metric="position", value=1e-3, why="because")
 KNOWN = replace(LIMIT, known="it is known to do that", known_size=1.0)
@@ -387,6 +388,18 @@ def test_an_engine_whose_own_settings_have_changed_is_outside(default: bool, sca
     rows = [row for row in judged(shipped, [entry], truth_of(shipped), "") if row.metric == "settings"]
     assert [row.verdict for row in rows] == told * [Word.OUTSIDE]
     assert all("rtol=2e-09" in row.why for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("asked", "own"),
+    [({}, [True, True]), ({"reference:cvode.rtol": 1e-7}, [True, False])],
+)
+def test_settings_are_an_engines_own_unless_some_that_it_has_are_asked_for(
+    asked: dict[str, float], own: list[bool], case: Case
+) -> None:
+    wanted = picks(["reference:compiled", "reference:cvode"])
+    entries = jobs.run_case(case, wanted, settings=asked, refine=False).entries
+    assert [entry.default for entry in entries] == own
 
 
 @pytest.mark.parametrize("claimed", [False, True])
