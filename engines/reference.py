@@ -137,7 +137,7 @@ class Reference(Engine):
             return (
                 f"The reference has no rule {case.collisions!r} for several contacts; it has: {', '.join(COLLISIONS)}."
             )
-        return _no_friction(case, solver)
+        return frictional(case.scene) if solver == "ida" and case.general and case.scene is not None else None
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> ReferenceRun:
         """Build the mechanism of a case and everything that does not depend on time.
@@ -182,19 +182,6 @@ class Reference(Engine):
         numbers = {k: v for k, v in settings.items() if k not in times}
         used = dict(_settings.chosen(self.name, solver, _known(case, solver), numbers))
         return solver, used, _options(case, solver, {k: v for k, v in {**used, **times}.items() if k != "traced"})
-
-
-def _no_friction(case: Case, solver: str) -> str | None:
-    """Return why a scene's friction cannot be followed; None if there is none, or it can."""
-    found = frictional(case.scene) if case.general and case.scene is not None else None
-    if found is None or solver == "ida":
-        return found
-    if case.scene is not None and case.scene.loops:
-        return (
-            f"The scene has the loop {case.scene.loops[0].name!r} beside friction: that is not done. "
-            "without=loops, or without=friction, leaves either out of every engine."
-        )
-    return None
 
 
 def _known(case: Case, solver: str) -> dict[str, Parameter]:

@@ -118,12 +118,14 @@ def _placed(system: System, held: Index) -> NDArray[np.bool_]:
 def _off(state: State, held: Index, part: float, absolute: float) -> NDArray[np.bool_]:
     """Which rows are off by more than this part of every coordinate's size, and this beside it, explain.
 
-    An error of q turns the rows: along v they turn by H' v.
+    An error of q turns the rows: along v they turn by H' v. One that says what a joint does already is made of terms
+    that cancel: of H nothing is left that would tell their rounding.
     """
     H, q, v = np.abs(state.H[held]), state.sizes(), np.abs(state.v)
-    here = np.abs(state.h[held]) > H @ (part * q + absolute + ROUNDING * (1.0 + q))
+    terms = ROUNDING * (1.0 + q.max())
+    here = np.abs(state.h[held]) > H @ (part * q + absolute + ROUNDING * (1.0 + q)) + terms
     turned = np.abs(state.Hdv[held]) * (part * q.max() + absolute) / max(float(v.max()), np.finfo(float).tiny)
-    moving = np.abs(state.H[held] @ state.v) > H @ (part * v + absolute + ROUNDING * v) + turned
+    moving = np.abs(state.H[held] @ state.v) > H @ (part * v + absolute + ROUNDING * v) + turned + terms * v.max()
     off: NDArray[np.bool_] = (here & _placed(state.system, held)) | moving
     return off
 
