@@ -18,8 +18,13 @@ BUDGET = 5.0
 COARSE, LEAST, MANY = 1e-9, 50, 20
 """A scene is followed so tightly as takes up to so many times the steps of a coarse run, or of the least that counts:
 of a method of order 8 the tightest takes 3 times as many, unless rounding is what its errors are made of."""
-LADDER = (1.0, 10.0)
-"""Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
+LADDER = (1.0, 10.0, 100.0, 1000.0)
+"""Tolerances that are tried, in units of `Case.tight`."""
+BOUNDED = 2
+"""The first so many of them are left for the next where they take too many steps."""
+SHORTER = 0.1
+"""Each is left for the next, too, where a run that its budget ends gets less far than this part of the coarse one: where
+stiff contacts slide steps are of low order, and a hundred times as many for four digits more."""
 FEW, FEWEST, MORE, AMPLE = 4, 200, 2, 1.5
 """Steps that tell what one of an engine costs; how many a run takes at least, with those that choose its method; by how
 much more are tried next; and how much more than may be paid for before a run counts as too dear."""
@@ -64,10 +69,11 @@ def followed(case: Case, budget: float | None = None) -> Followed:
     coarse = motion(case, COARSE, **bound)
     most = {"max_steps": MANY * max(coarse.steps, LEAST)}
     cut = case if budget is None else cut_short(case, coarse)
-    for times, steps in (*((times, most) for times in LADDER), (10.0 * LADDER[-1], {})):
+    for k, times in enumerate(LADDER):
         tried = replace(cut, tight=times * case.tight)
-        found = tight(tried, **bound, **steps)
-        if found.outcome is not Outcome.STEP_LIMIT:
+        found = tight(tried, **bound, **(most if k < BOUNDED else {}))
+        stuck = found.outcome is Outcome.TIME_LIMIT and found.t[-1] < SHORTER * coarse.t[-1]
+        if found.outcome is not Outcome.STEP_LIMIT and not stuck:
             break
     last = tried if budget is None else cut_short(tried, found)
     ended = coarse if last is tried else found

@@ -247,6 +247,26 @@ def test_a_motion_that_takes_too_long_is_compared_as_far_as_it_is_followed() -> 
     np.testing.assert_array_equal(found.truth.trajectory.q[-1], own.q[-1])
 
 
+@pytest.mark.parametrize(("order", "times"), [(8.0, 1.0), (3.5, 10.0), (1.5, 1000.0)])
+def test_digits_are_left_where_they_would_cost_nearly_all_of_a_motion(
+    order: float, times: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run of a method of that order gets as far in its budget as its steps are long."""
+    case = pendulum(1.0, False, 1.0, 10.0)
+
+    def ended(case: Case, rtol: float, **settings: Any) -> Trajectory:
+        run, until = motion(replace(case, t_end=1e-3), 1e-6), min(2.0 * (rtol / 1e-9) ** (1.0 / order), case.t_end)
+        late = until < case.t_end and "time_limit" in settings
+        return replace(run, t=until * run.t / run.t[-1], outcome=Outcome.TIME_LIMIT if late else Outcome.FINISHED)
+
+    monkeypatch.setattr("crossbody.reports.judging.reach.motion", ended)
+    monkeypatch.setattr("crossbody.reports.judging.reach.tight", lambda case, **more: ended(case, case.tight, **more))
+    found = followed(case, 5.0)
+    assert found.case.tight == pytest.approx(times * case.tight)
+    assert found.part == pytest.approx(min(0.2, 0.2 * (found.case.tight / 1e-9) ** (1.0 / order)), rel=0.1)
+    assert found.why
+
+
 def test_a_motion_is_compared_up_to_where_the_law_has_none_further() -> None:
     """Painleve's rod, which no force holds open: what engines do before is judged."""
     case = cases.from_scene(rod_on_floor(1.6), q0=[0.0, 0.5 * np.cos(0.5) + 0.05, -0.5], v0=[1.5, 0.0, 0.0], t_end=0.3)
