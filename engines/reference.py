@@ -137,7 +137,7 @@ class Reference(Engine):
             return (
                 f"The reference has no rule {case.collisions!r} for several contacts; it has: {', '.join(COLLISIONS)}."
             )
-        return _no_friction(case, solver)
+        return frictional(case.scene) if solver == "ida" and case.general and case.scene is not None else None
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> ReferenceRun:
         """Build the mechanism of a case and everything that does not depend on time.
@@ -184,19 +184,6 @@ class Reference(Engine):
         return solver, used, _options(case, solver, {k: v for k, v in {**used, **times}.items() if k != "traced"})
 
 
-def _no_friction(case: Case, solver: str) -> str | None:
-    """Return why a scene's friction cannot be followed; None if there is none, or it can."""
-    found = frictional(case.scene) if case.general and case.scene is not None else None
-    if found is None or solver == "ida":
-        return found
-    if case.scene is not None and case.scene.loops:
-        return (
-            f"The scene has the loop {case.scene.loops[0].name!r} beside friction: that is not done. "
-            "without=loops, or without=friction, leaves either out of every engine."
-        )
-    return None
-
-
 def _known(case: Case, solver: str) -> dict[str, Parameter]:
     low, high = TOLERANCES
     known = {
@@ -206,7 +193,7 @@ def _known(case: Case, solver: str) -> dict[str, Parameter]:
         "samples": Parameter(default=0, doc="number of equidistant rows; 0 for every step", low=0, high=1e8),
         "fsm": Parameter(default=OF_THE_CASE, doc="state machine", choices=(OF_THE_CASE, *FSMS)),
         "max_steps": Parameter(default=1_000_000, doc="bound on the number of steps", low=1, high=1e12),
-        "time_limit": Parameter(default=3600.0, unit="s", doc="bound on wall time", low=0.0, open_low=True),
+        "time_limit": Parameter(default=3600.0, unit="s", doc="bound on processor time", low=0.0, open_low=True),
     }
     if solver == "compiled":
         known["shortcuts"] = Parameter(default=True, doc="closed-form arcs where the scene is affine", low=0, high=1)
@@ -220,10 +207,17 @@ def _known(case: Case, solver: str) -> dict[str, Parameter]:
 
 def _off(case: Case, error: OffRowsError) -> str:
     """Return what is wrong with the start of a file and what its user can do, in the file's names."""
-    advice = f"--set assemble=1 starts in every engine at the nearest that is on them: {error.near}."
+    advice = NOT_FOUND
+    if error.near is not None:
+        moved = np.abs(error.near[0] - case.q0)
+        most = int(np.argmax(moved))
+        advice = (
+            "--set assemble=1 starts in every engine at the nearest that is on them, which moves "
+            f"{case.coordinates[most].name!r} by {moved[most]:.3g} and no other coordinate further."
+        )
     return (
         f"{case.label}: the start is off {case.contacts[error.row]!r}, which is always on: {error.off}. "
-        f"{advice if error.near else NOT_FOUND} --without loops leaves such rows out of every engine."
+        f"{advice} --without loops leaves such rows out of every engine."
     )
 
 

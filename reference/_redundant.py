@@ -18,6 +18,7 @@ from crossbody.reference.kinds import Floats, Index
 
 INDEPENDENT = 1e-4  # pivot over the first from which on a row does not follow from the others
 ROUNDED = 1e-8  # below which it does, as far as rounding tells
+NOTHING = 1e-12  # m by m or rad: what no velocity moves a loop by more than is rounding
 OPEN, ROUNDING = 100.0, 1e-6  # times the gap of the rows that hold, and at least, m: more is not held any longer
 
 
@@ -88,11 +89,15 @@ def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
             f"moves there without a mass is above all velocity {int(np.abs(ways[:, 0]).argmax())}, counted from 0."
         )
     root = np.linalg.cholesky(M)
-    scaled = np.linalg.solve(root, state.H[rows].T).T
+    H = state.H[rows]
+    scaled = np.linalg.solve(root, H.T).T
     at = 0
     for group in groups:
         part = scaled[at : at + len(group)]
-        part /= np.linalg.norm(part, axis=1).max() or 1.0
+        if np.abs(H[at : at + len(group)]).max(initial=0.0) > NOTHING:
+            part /= np.linalg.norm(part, axis=1).max()
+        else:  # the loop says what a joint does already
+            part[:] = 0.0
         at += len(group)
     from scipy.linalg import qr  # .2 s of imports that no other scene needs
 

@@ -17,6 +17,7 @@ from crossbody.reference import _dense
 from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
 from crossbody.reference._dense import Marks, Motion
+from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._interrupt import LONG_S, Interrupts
 from crossbody.reference._program import entry, friction_code, instant_code
 from crossbody.reference._redundant import watched
@@ -156,7 +157,7 @@ class CompiledRun:
         self.marks = Marks(self, _dense.ROOM) if self.options.dense else None
         began = time.perf_counter()
         self.start()
-        outcome = self._slices(began, progress)
+        outcome = self._slices(progress)
         took = time.perf_counter() - began
         failure = None if self.callback is None else self.callback.failure
         if failure is None:
@@ -178,15 +179,15 @@ class CompiledRun:
         live = Live(system.activations) if system.activations is not None else None
         self.callback = Callback(system.control.begin(system.inputs), system.nq, system.n, end, live)
 
-    def _slices(self, began: float, progress: Callable[[float], None] | None) -> Outcome:
+    def _slices(self, progress: Callable[[float], None] | None) -> Outcome:
         try:
             with Interrupts() as interrupts:
-                return self._advance(began, progress, interrupts)
+                return self._advance(progress, interrupts)
         except KeyboardInterrupt:
             return Outcome.INTERRUPTED
 
-    def _advance(self, began: float, progress: Callable[[float], None] | None, interrupts: Interrupts) -> Outcome:
-        limit, budget = self.options.max_steps, SLICE
+    def _advance(self, progress: Callable[[float], None] | None, interrupts: Interrupts) -> Outcome:
+        limit, budget, elapsed = self.options.max_steps, SLICE, Elapsed()
         while True:
             steps, before = int(self.state["steps"][0]), time.perf_counter()
             if steps >= limit:
@@ -200,7 +201,7 @@ class CompiledRun:
             self._grow(code)
             interrupts.answer()
             now = time.perf_counter()
-            if now - began > self.options.time_limit:
+            if elapsed.seconds() > self.options.time_limit:
                 return Outcome.TIME_LIMIT
             if now - before > LONG_S and self.callback is None:  # a controller in Python may hang
                 interrupts.hold()

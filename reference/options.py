@@ -75,8 +75,8 @@ class Options:
         index: 1, or 3 for bilateral rows under "ida".
         max_step: longest step, s.
         max_steps: bound on steps.
-        time_limit: bound on wall time, s; looked at between slices of steps. It does not end a kernel that never
-            returns: only its process can be ended, as the command line does.
+        time_limit: bound on processor time, s, and ten times as long by the clock; looked at between slices of steps.
+            It does not end a kernel that never returns: only its process can be ended, as the command line does.
     """
 
     t_end: float
@@ -176,7 +176,7 @@ class Options:
 
         Raises:
             InvalidValue: for another machine or solver.
-            SceneError: for a system with loops, fast constants or an algebra of its own.
+            SceneError: for a system with fast constants or an algebra of its own.
         """
         if not system.frictional:
             return
@@ -185,9 +185,6 @@ class Options:
             raise InvalidValue(f"fsm is {self.fsm!r}, and {why}; valid: 'level'.")
         if self.solver == "ida":
             raise InvalidValue(f"solver is {self.solver!r}, and {why}; valid: 'compiled', 'cvode'.")
-        rows = np.flatnonzero(system.held)
-        if len(rows):
-            raise SceneError(f"Row {rows[0]} is always on, and {why}: loops beside friction are not done.")
         if np.any(np.asarray(system.b0) > 0.0) or np.any(np.asarray(system.b1) > 0.0):
             raise SceneError(f"System.b0, b1 are given, and {why}: collisions with friction are not done.")
         if system.solve is not None:

@@ -32,12 +32,15 @@ class OffRowsError(SceneError):
     Attributes:
         row: which.
         off: what its gap and its rate are.
-        near: the nearest start on all such rows, as text; empty if none was found.
+        near: positions (nq,) and velocities (n,) of the nearest start on all such rows; None if none was found.
     """
 
-    def __init__(self, run: str, row: int, off: str, near: str) -> None:
+    def __init__(self, run: str, row: int, off: str, near: tuple[Floats, Floats] | None) -> None:
         self.row, self.off, self.near = row, off, near
-        offered = f"The nearest on all such rows is {near} (System.project)." if near else NOT_FOUND
+        offered = NOT_FOUND
+        if near is not None:
+            q0, v0 = (part.tolist() for part in near)
+            offered = f"The nearest on all such rows is q0 = {q0}, v0 = {v0} (System.project)."
         super().__init__(
             f"The start{run} is off row {row}, which is always on: {off}. {offered} "
             "consistent=False admits a start that is off its rows on purpose."
@@ -69,7 +72,7 @@ def check_start(
     if np.any(off):
         i = int(held[np.argmax(off)])
         rate = f"h = {state.h[i]:.6g} and h' = {state.H[i] @ v:.6g}, more than rtol = {options.rtol:g} explains"
-        raise OffRowsError(run, i, rate, _shown(_projected(state, held)))
+        raise OffRowsError(run, i, rate, _projected(state, held))
 
 
 def check_starts(system: System, starts: Floats, parameters: Floats, options: Options) -> None:
@@ -91,10 +94,6 @@ def project(system: System, q: Floats, v: Floats) -> tuple[Floats, Floats]:
     if found is None:
         raise SceneError(f"No state on the rows that are always on is found from q = {q.tolist()}, v = {v.tolist()}.")
     return found
-
-
-def _shown(near: tuple[Floats, Floats] | None) -> str:
-    return "" if near is None else f"q0 = {near[0].tolist()}, v0 = {near[1].tolist()}"
 
 
 def _may_hold(system: System) -> NDArray[np.bool_]:
@@ -119,12 +118,14 @@ def _placed(system: System, held: Index) -> NDArray[np.bool_]:
 def _off(state: State, held: Index, part: float, absolute: float) -> NDArray[np.bool_]:
     """Which rows are off by more than this part of every coordinate's size, and this beside it, explain.
 
-    An error of q turns the rows: along v they turn by H' v.
+    An error of q turns the rows: along v they turn by H' v. One that says what a joint does already is made of terms
+    that cancel: of H nothing is left that would tell their rounding.
     """
     H, q, v = np.abs(state.H[held]), state.sizes(), np.abs(state.v)
-    here = np.abs(state.h[held]) > H @ (part * q + absolute + ROUNDING * (1.0 + q))
+    terms = ROUNDING * (1.0 + q.max())
+    here = np.abs(state.h[held]) > H @ (part * q + absolute + ROUNDING * (1.0 + q)) + terms
     turned = np.abs(state.Hdv[held]) * (part * q.max() + absolute) / max(float(v.max()), np.finfo(float).tiny)
-    moving = np.abs(state.H[held] @ state.v) > H @ (part * v + absolute + ROUNDING * v) + turned
+    moving = np.abs(state.H[held] @ state.v) > H @ (part * v + absolute + ROUNDING * v) + turned + terms * v.max()
     off: NDArray[np.bool_] = (here & _placed(state.system, held)) | moving
     return off
 

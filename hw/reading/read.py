@@ -172,11 +172,8 @@ def _gather(found: Scan, repair: Collection[str], limit: int) -> tuple[Rows, tup
         repairs += unwrapped
     checks = _checked(plan, plan.own, block)
     if plan.joined:
-        block, trimmed = _joined(found, block, limit)
-        repairs += trimmed
-        if "unwrap" in repair:
-            block, unwrapped = _repair.unwrap(block, _angles(plan.sources))
-            repairs += unwrapped
+        block, joined = _joined(found, block, limit, unwrap="unwrap" in repair)
+        repairs += joined
         checks = _checked(plan, plan.sources, block)
     return block, repairs, checks
 
@@ -195,19 +192,38 @@ def _checked(plan: Plan, sources: Sequence[Source], block: Rows) -> Checks:
     return checks
 
 
-def _joined(found: Scan, block: Rows, limit: int) -> tuple[Rows, tuple[Repair, ...]]:
+def _joined(found: Scan, block: Rows, limit: int, *, unwrap: bool) -> tuple[Rows, tuple[Repair, ...]]:
     """The rows with the signals that have times of their own, without the leading rows that lack one of them."""
-    plan, lead = found.plan, 0
+    plan, lead, repairs = found.plan, 0, tuple[Repair, ...]()
     values: dict[str, Floats] = {s.label: v for s, v in zip(plan.own, block.values, strict=True)}
     for _, group in groupby(sorted(plan.joined, key=_clock), key=_clock):
         sources = list(group)
         other = collect(found.stream.joined(sources), plan, sources[0].group, limit)
+        other, unwrapped = _over_turns(plan, sources, other, unwrap)
+        repairs += unwrapped
         got, late = join(plan.path, plan.columns.join, block.time, other, sources[0].signal.column)
         lead = max(lead, late)
         values |= {s.label: v for s, v in zip(sources, got, strict=True)}
     whole = Rows(rows=block.rows, time=block.time, values=tuple(values[s.label] for s in plan.sources))
     trim = Repair(name="trim", rows=lead, row=int(block.rows[0]), t=float(block.time[0]))
-    return whole.take(slice(lead, None)), (trim,) if lead else ()
+    return whole.take(slice(lead, None)), (*repairs, trim) if lead else repairs
+
+
+def _over_turns(plan: Plan, sources: Sequence[Source], rows: Rows, unwrap: bool) -> tuple[Rows, tuple[Repair, ...]]:
+    """Rows of other times with angles that go on over a turn: between the two sides of a wrap nothing lies.
+
+    Raises:
+        LogFormatError: if they wrap, are not to be unwrapped and would be joined by straight lines.
+    """
+    if unwrap:
+        return _repair.unwrap(rows, _angles(sources))
+    if plan.columns.join == "linear":
+        apart = Checks(sources, None)
+        apart.see(rows)
+        wraps = (finding for finding in apart.findings() if finding.check == "wraps")
+        if (first := next(wraps, None)) is not None:
+            raise first.error(plan.path)
+    return rows, ()
 
 
 def _clock(source: Source) -> tuple[str, str]:

@@ -15,6 +15,7 @@ from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, p
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.friction import is_shared
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
+from crossbody.reference.core.loops import bears_nothing
 from crossbody.reference.kinds import Bytes
 
 CLOSE = 1e-9  # part of the terms behind a row's multiplier: rounding stays far below, and asks no further
@@ -56,8 +57,8 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
         if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t + s.hs, q, v, GENERAL) != 0:
             return True  # redundant for the general algebra: nothing to compare with
     for j in range(s.na):
-        if s.frictional and is_shared(s, m, w, w.idx[j]):
-            continue
+        if s.frictional and (is_shared(s, m, w, w.idx[j]) or (s.loops and bears_nothing(m, w, j))):
+            continue  # or loops hold it, as its elimination has checked
         missing, rounding = _residual(s, m, w, b.mode, j, stage)
         if missing <= CLOSE * w.scale[j] + rounding:
             continue

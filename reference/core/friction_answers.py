@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.core import cones, coulomb, jams, slips, sticking, turning, undetermined
+from crossbody.reference.cache import compiled
+from crossbody.reference.core import cones, coulomb, jams, loops, slips, sticking, turning, undetermined
 from crossbody.reference.core.friction import (
     BEGIN,
     BEGIN_SLIP,
@@ -26,6 +27,25 @@ from crossbody.reference.core.friction import (
     small_slip,
 )
 from crossbody.reference.core.layout import Model, Work
+
+
+@compiled
+def _respond(s: Any, m: Model, w: Work) -> None:
+    """Fill w.la of all rows in contact by how it changes with w.r."""
+    if s.loops:
+        loops.reduce_right(s, m, w, w.r)
+    coulomb.respond(s, m, w, w.r, w.la)
+    if s.loops:
+        loops.complete(s, m, w, w.r, w.la, True)
+
+
+@compiled
+def _turn_part(s: Any, m: Model, w: Work, i: int) -> float:
+    """Return `turning.turn_part`, with what loops do to it in w.la."""
+    part = turning.turn_part(s, m, w, i)
+    if s.loops:
+        loops.complete(s, m, w, w.r, w.la, False)
+    return float(part)
 
 
 def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
@@ -52,8 +72,10 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         return float(coulomb.factor(s, m, w, i != 0))
     if what == SOLVE:
         coulomb.solve(s, m, w, w.r, w.la)
+        if s.loops:
+            loops.complete(s, m, w, w.r, w.la, True)
     elif what == RESPOND:
-        coulomb.respond(s, m, w, w.r, w.la)
+        _respond(s, m, w)
     elif what == DETERMINANT:
         return float(jams.determinant(s, m, w, w.listed[i]))
     elif what == MARGIN:
@@ -64,7 +86,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == TURNING_RATE:
         return float(turning.turning_rate(s, m, w, i != 0))
     elif what == TURN_PART:
-        return float(turning.turn_part(s, m, w, i))
+        return float(_turn_part(s, m, w, i))
     elif what == RENEW:
         linger = slips.renew(s, m, w, w.rates[0])
         undetermined.follow_shares(s, m, w, False)

@@ -35,7 +35,7 @@ OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
     "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among", "seen",
     "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by",
-    "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2",
+    "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -137,6 +137,7 @@ STATE = np.dtype(
         ("normals", "i8"),  # and how many are no sticking rows
         ("rank", "i8"),
         ("dependent_rows", "i8"),
+        ("closed", "i8"),  # rows of loops that were eliminated before
         ("rank_first", "i8"),
         ("rank_second", "i8"),
         ("sets", "i8"),  # of modes that were tried
@@ -360,6 +361,10 @@ class Work:
     open_v: Floats  # (n,) by how much velocities may differ for what shares of loads did before,
     open_rate: Floats  # and accelerations by those of now
     pushed: Floats  # (nc,) right-hand sides less what forces of rows do that slide with a bound of their own
+    loop: Index  # places of rows of loops,
+    closing: Floats2  # the factor L of G = L L^T of these,
+    led: Floats2  # L^-1 G of these and all others, by columns,
+    drawn: Floats  # and L^-1 of their right-hand sides
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)
@@ -392,7 +397,7 @@ def workspace(
         **dict.fromkeys(("guard", "guard_hit"), (ng,)),
         "guards": (NODES, ng), "discrete": (nd,), "sets": (SETS * frictional, nc), "cones": (NODES * frictional, nc),
         **dict.fromkeys(OF_FRICTION, (sliding,)),
-        **dict.fromkeys(("matrix", "first", "second", "held", "square", "turns"), (sliding, sliding)),
+        **dict.fromkeys(("matrix", "first", "second", "held", "square", "turns", "closing", "led"), (sliding, sliding)),
     }  # fmt: skip
     types = {"Index": np.int64, "Bytes": np.int8}
     return {

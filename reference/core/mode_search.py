@@ -21,13 +21,14 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.beginnings import look_around, turn
 from crossbody.reference.core.friction import bound, decided_to, has_friction, is_dry
 from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
+from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_set import ahead, aside, evaluate_set, first_row, jammed, keep, put, size_along
-from crossbody.reference.core.slips import CLEAR
 
 SWEEPS = 60
 TURNS = 40  # of directions of slip towards those of acceleration
 TURNED = 1e-12
 MOST_SETS = 256
+BELOW = 1e-6  # part of its bound by which a force stays below it to count as that of a contact that sticks
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 
 
@@ -42,6 +43,8 @@ def _worst(s: Any, m: Model, w: Work) -> int:
         w.wants[i] = w.state[i]
         if w.state[i] == FREE:
             missing, becomes = -w.excess[j], STICK if w.stands[i] else SLIP
+            if s.loops and is_idle(w, j):  # it stays where loops hold it
+                missing = np.inf
         else:
             missing, becomes = -w.load[j] * w.gram[j, j], FREE
             if is_dry(m, i):
@@ -173,9 +176,9 @@ def _sweep(s: Any, m: Model, w: Work) -> None:
         if has_friction(m, i):
             if w.stands[i]:
                 aim(m, w, i)
-            if w.la[j] * w.gram[j, j] <= decided_to(s) and not is_dry(m, i):
+            if w.la[j] * w.gram[j, j] <= decided_to(s) and not is_dry(m, i) and not (s.loops and is_idle(w, j)):
                 put(m, w, i, FREE)
-            elif w.stands[i] and size_along(m, w, i, w.la) < (1.0 - CLEAR) * bound(m, i, w.la[j]):
+            elif w.stands[i] and size_along(m, w, i, w.la) < (1.0 - BELOW) * bound(m, i, w.la[j]):
                 put(m, w, i, STICK)
             else:
                 put(m, w, i, SLIP)

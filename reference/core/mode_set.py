@@ -11,6 +11,7 @@ from crossbody.reference.core.coulomb import factor_set, solve
 from crossbody.reference.core.friction import has_friction, is_dry, slip, small_slip
 from crossbody.reference.core.jams import JAMMED, determinant
 from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
+from crossbody.reference.core.loops import is_idle, is_loop
 from crossbody.reference.kinds import Array
 
 CLEAR_OF_A_JAM = 1e-5  # determinant, of rows of size 1, of what goes on where others jam
@@ -35,7 +36,10 @@ def look(s: Any, m: Model, w: Work) -> None:
         i = w.idx[j]
         tangential = m.follows[i] >= 0 and has_friction(m, m.follows[i])
         w.bare[j] = w.r[j] + (w.law[i, 1] * w.hda[j] if tangential else 0.0)
-        s.push_scale = max(s.push_scale, w.scale[j])
+        if s.loops and (is_loop(m, i) or is_idle(w, j)):
+            w.bare[j] = 0.0
+        else:
+            s.push_scale = max(s.push_scale, w.scale[j])
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):

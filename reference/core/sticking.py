@@ -9,6 +9,7 @@ from crossbody.reference.core.cones import without_pull
 from crossbody.reference.core.friction import count_from_none, decided_to, has_friction, is_dry, slip
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
+from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_search import ALL, WORST, aim, iterate, judge, near_sets, swept, vary
 from crossbody.reference.core.mode_set import (
     DIFFERENT,
@@ -145,6 +146,18 @@ def _most_pull(s: Any, m: Model, w: Work) -> float:
 
 
 @compiled
+def _leaves_open(s: Any, m: Model, w: Work) -> bool:
+    """Whether loops hold a contact that may slide: how hard it presses, and its friction, no law says."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and not is_dry(m, i) and is_idle(w, j):
+            for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
+                if not is_idle(w, c):
+                    return True
+    return False
+
+
+@compiled
 def decide(s: Any, m: Model, w: Work) -> int:
     """Leave in w.state the mode that the present instant, as evaluated, asks for, of every contact with friction.
 
@@ -172,6 +185,8 @@ def decide(s: Any, m: Model, w: Work) -> int:
             w.tolerated[i] = decided_to(s) / w.gram[j, j]
     for i in range(s.nc):
         w.off[i], w.begins[i] = 0, 0
+    if s.loops and not s.indeterminate and _leaves_open(s, m, w):
+        s.indeterminate, s.determined_until = 1, s.t
     return 0
 
 

@@ -20,6 +20,7 @@ from crossbody.reference.core.complete import factor_complete
 from crossbody.reference.core.coulomb import respond
 from crossbody.reference.core.friction import has_friction, is_dry, is_tangent, most_drift
 from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.core.loops import complete
 from crossbody.reference.core.unknowns import fill
 
 MOVES = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
@@ -123,6 +124,8 @@ def _take_shares(s: Any, m: Model, w: Work) -> None:
         for k in range(rank, s.unknowns):
             _change_nothing(s, m, w, rank, k)
             if _move(s, w):
+                if s.loops:
+                    complete(s, m, w, w.r, w.trial, False)
                 _add(s, m, w, w.trial, _range(s, m, w), w.open_rate)
     s.open_slip, size = _fastest(s, m, w), 0.0
     for c in range(s.n):
@@ -154,6 +157,8 @@ def _take_back(s: Any, m: Model, w: Work) -> None:
         i = w.idx[j]
         w.r[j] = -_row(m, w, j, w.open_v) if is_tangent(m, i) and not w.slides[i] else 0.0
     respond(s, m, w, w.r, w.la)
+    if s.loops:
+        complete(s, m, w, w.r, w.la, False)
     for j in range(s.na):
         for c in range(m.span[w.idx[j], 0], m.span[w.idx[j], 1]):
             w.open_v[c] += w.X[j, c] * w.la[j]

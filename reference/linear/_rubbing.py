@@ -128,7 +128,13 @@ def check_slips(at: Point, H: Floats) -> None:
 
 
 def check_jam(at: Point, A: Floats, G: Floats) -> None:
-    """Refuse sliding contacts whose forces drive them into each other: A must have a positive determinant."""
+    """Refuse sliding contacts whose forces drive them into each other: A must have a positive determinant.
+
+    Rows that are always on are eliminated: how near to each other they are says nothing of contacts.
+    """
+    on = np.asarray(at.system.held)[at.active[at.solved]]
+    if on.any() and not on.all():
+        A, G = (B[~on][:, ~on] - B[~on][:, on] @ np.linalg.solve(B[on][:, on], B[on][:, ~on]) for B in (A, G))
     size = np.sqrt(np.diag(G))
     if len(at.sliding) and not np.linalg.det(A / np.outer(size, size)) > JAMMED:
         raise SceneError(

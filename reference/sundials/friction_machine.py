@@ -97,7 +97,7 @@ class FrictionMachine(LevelMachine):
         """V' (n,) and multipliers of all rows (nc,) of the present modes."""
         seen, balance = self.weigh(t, q, v)
         lam, every = balance.forces(), np.zeros(len(self.modes))
-        every[seen.rows] = lam
+        every[seen.rows], every[self.sliding.loops] = lam, seen.own + seen.borne @ lam
         return seen.vd + seen.X @ lam, every
 
     def _ways_of(self, seen: Seen) -> dict[int, Floats]:

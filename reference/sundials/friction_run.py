@@ -82,7 +82,7 @@ class SlidingArc(DenseStep):
 
     def _pole(self) -> float:
         """Fastest pole of the laws in contact, 1/s; 1 without contacts."""
-        laws = self.run.friction.sliding.slow[self.run.friction.contacts()]
+        laws = self.run.friction.sliding.slow[[*self.run.friction.contacts(), *self.run.friction.sliding.loops]]
         return float(max(1.0, np.sqrt(laws[:, 0]).max(initial=0.0), laws[:, 1].max(initial=0.0)))
 
     @property

@@ -19,6 +19,7 @@ from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajector
 from crossbody.cases.control import Control, NotFinite
 from crossbody.reference._activations import Live
 from crossbody.reference._blame import dependence, not_finite, vanished
+from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
@@ -112,7 +113,7 @@ class SundialsRun:
         outcome = Outcome.FINISHED
         try:
             with quiet():
-                self._drive(began, progress)
+                self._drive(progress)
         except Ended as end:
             outcome, self.ended_rows = end.outcome, end.rows
             if outcome is Outcome.STEP_TOO_SMALL:
@@ -123,8 +124,8 @@ class SundialsRun:
             outcome = Outcome.INTERRUPTED
         return outcome, time.perf_counter() - began
 
-    def _drive(self, began: float, progress: Callable[[float], None] | None) -> None:
-        t_end = self.options.t_end
+    def _drive(self, progress: Callable[[float], None] | None) -> None:
+        t_end, elapsed = self.options.t_end, Elapsed()
         stop = self._take_inputs()
         self._discretely(START)
         self._give()
@@ -133,7 +134,7 @@ class SundialsRun:
         self.folds.begin(self.state.t, self.state.q, self.state.v)
         arc = self._arc(view)
         while self.state.t < t_end:
-            self._check_bounds(began)
+            self._check_bounds(elapsed)
             switched = self._step(arc, stop)
             if switched is None:
                 arc = self._arc(view, cautious=True)
@@ -150,10 +151,10 @@ class SundialsRun:
             else:
                 arc = self._arc_on(arc, view)
 
-    def _check_bounds(self, began: float) -> None:
+    def _check_bounds(self, elapsed: Elapsed) -> None:
         if self.scene.steps >= self.options.max_steps:
             raise Ended(Outcome.STEP_LIMIT)
-        if time.perf_counter() - began > self.options.time_limit:
+        if elapsed.seconds() > self.options.time_limit:
             raise Ended(Outcome.TIME_LIMIT)
 
     def _settle(self, switched: bool) -> View:

@@ -13,6 +13,8 @@ from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.balance import Balance, Unknowns
 from crossbody.reference.sundials.equations import Ended, Equations
 
+HELD = 1e-10  # part of what moves a row without loops, below which it is rounding
+
 
 @dataclass(frozen=True, slots=True)
 class Seen:
@@ -25,8 +27,10 @@ class Seen:
         bare: (m,) what their multipliers must do, without what pulls sticking rows back, m/s^2.
         pull: (m,) that.
         rate: (m,) their rates against what the surface does by itself, m/s.
-        X: (n, m) M^-1 H^T.
+        X: (n, m) what their multipliers do to v', M^-1 H^T where no loops are.
         vd: (n,) acceleration without them.
+        borne: (l, m) what their multipliers do to those of loops.
+        own: (l,) these without them.
     """
 
     rows: list[int]
@@ -37,6 +41,8 @@ class Seen:
     rate: Floats
     X: Floats
     vd: Floats
+    borne: Floats
+    own: Floats
 
     def part(self, rows: list[int]) -> Seen:
         """Only some of the rows."""
@@ -46,19 +52,21 @@ class Seen:
         at = {row: k for k, row in enumerate(rows)}
         G, X, (a, b) = self.G, self.X[..., keep], np.ix_(keep, keep)
         return Seen(
-            rows, at, G[..., a, b], self.bare[..., keep], self.pull[..., keep], self.rate[..., keep], X, self.vd
-        )
+            rows, at, G[..., a, b], self.bare[..., keep], self.pull[..., keep], self.rate[..., keep], X, self.vd,
+            self.borne[..., keep], self.own,
+        )  # fmt: skip
 
     def one(self, k: int) -> Seen:
         """Of several instants one."""
-        return Seen(self.rows, self.at, *(x[k] for x in (self.G, self.bare, self.pull, self.rate, self.X, self.vd)))
+        own = self.G, self.bare, self.pull, self.rate, self.X, self.vd, self.borne, self.own
+        return Seen(self.rows, self.at, *(x[k] for x in own))
 
 
 class Sliding:
     """Evaluates rows in contact, and sets of modes of theirs.
 
     Args:
-        system: with rows that have friction, and none that is always on.
+        system: with rows that have friction.
         equations: of its run; its counter of evaluations goes on.
 
     Attributes:
@@ -67,6 +75,7 @@ class Sliding:
         dry: rows with dry friction of their own, which are their own contacts.
         tied: other rows that follow each contact.
         owner: the contact of any row.
+        loops: rows that are always on.
     """
 
     def __init__(self, system: System, equations: Equations) -> None:
@@ -82,6 +91,7 @@ class Sliding:
             if i >= 0 and t not in self.normal:
                 self.tied.setdefault(i, []).append(t)
         self.owner = {row: self.normal.get(row, i if i >= 0 else row) for row, i in enumerate(follows)}
+        self.loops: list[int] = [row for row, own in self.owner.items() if system.held[own]]
         self.redundant = 0
         self._unknowns: dict[tuple[tuple[int, ...], tuple[Mode, ...]], Unknowns] = {}
 
@@ -100,25 +110,62 @@ class Sliding:
     def see_all(self, times: list[float], q: Floats, v: Floats, contacts: list[int]) -> Seen:
         """Evaluate them at b instants, positions (b, nq) and velocities (b, n); see `see`."""
         e, rows, found = self.equations, self.rows(contacts), list[tuple[Floats, ...]]()
-        with e._selected(rows):
+        every, count = [*rows, *self.loops], len(rows)
+        with e._selected(every):
             for t, one, its in zip(times, q, v, strict=True):
                 M, f = (a.copy() for a in e.terms(t, one, its))
                 found.append((M, f, *(a.copy() for a in e.rows(t, one, its))))
         M, f, H, h, Hdv = (np.array(a) for a in zip(*found, strict=True))
-        try:
-            solved = np.linalg.solve(M, np.concatenate([H.swapaxes(1, 2), f[..., None]], axis=2))
-        except np.linalg.LinAlgError:
-            raise Ended(Outcome.ILL_POSED, rows) from None
-        if not np.isfinite(solved).all():
-            raise Ended(Outcome.NOT_FINITE)
-        X: Floats = solved[..., :-1]
-        vd, rate = solved[..., -1], _times(H, v) - self.drift[rows]
-        a0, a1, a2 = self.slow[rows].T
+        rate = _times(H, v) - self.drift[every]
+        a0, a1, a2 = self.slow[every].T
         law = a1 * rate + (a0 + a2 * h * h) * h
+        solved = self._solved(M, f, H, -(Hdv + law)[..., count:], rows)
+        H, Hdv, law, n = H[..., :count, :], Hdv[..., :count], law[..., :count], M.shape[-1]
+        X: Floats = solved[..., :n, :-1]
+        vd, G = solved[..., :n, -1], H @ X
         slides = np.array([row in self.normal for row in rows], dtype=bool)
         bare = -(_times(H, vd) + Hdv) - np.where(slides, 0.0, law)
+        if self.loops:
+            self._leave_held(M, H, G, bare, rows)
         at = {row: k for k, row in enumerate(rows)}
-        return Seen(rows, at, H @ X, bare, np.where(slides, -law, 0.0), rate, X, vd)
+        return Seen(
+            rows, at, G, bare, np.where(slides, -law, 0.0), rate[..., :count], X, vd, solved[..., n:, :-1],
+            solved[..., n:, -1],
+        )  # fmt: skip
+
+    def _solved(self, M: Floats, f: Floats, H: Floats, asked: Floats, rows: list[int]) -> Floats:
+        """What unit multipliers of rows, and all forces at last, do to v' and multipliers of loops (b, n + l, m + 1).
+
+        The equations of motion are solved together with those of the loops, which accelerate as `asked`.
+        """
+        n, held = M.shape[-1], len(self.loops)
+        right = np.zeros((len(M), n + held, len(rows) + 1))
+        right[:, :n, :-1], right[:, :n, -1] = H[:, : len(rows)].swapaxes(1, 2), f
+        whole: Floats = M
+        if held:
+            whole = np.zeros((len(M), n + held, n + held))
+            whole[:, :n, :n], whole[:, n:, :n] = M, H[:, len(rows) :]
+            whole[:, :n, n:], right[:, n:, -1] = -H[:, len(rows) :].swapaxes(1, 2), asked
+        try:
+            solved = np.asarray(np.linalg.solve(whole, right), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            raise Ended(Outcome.ILL_POSED, [*rows, *self.loops]) from None
+        if not np.isfinite(solved).all():
+            raise Ended(Outcome.NOT_FINITE)
+        return solved
+
+    def _leave_held(self, M: Floats, H: Floats, G: Floats, bare: Floats, rows: list[int]) -> None:
+        """Put zeros for rows that loops hold, so that nothing moves them but rounding.
+
+        Raises:
+            Ended: ILL_POSED for a contact: how hard it presses no law says.
+        """
+        free = (H * np.linalg.solve(M, H.swapaxes(1, 2)).swapaxes(1, 2)).sum(axis=-1)
+        idle = np.diagonal(G, axis1=1, axis2=2) <= HELD * free
+        for b, k in np.argwhere(idle).tolist():
+            if rows[k] not in self.normal:
+                raise Ended(Outcome.ILL_POSED, [rows[k]])
+            G[b, k], G[b, :, k], bare[b, k] = 0.0, 0.0, 0.0
 
     def bound(self, seen: Seen, lam: Floats, i: int) -> float:
         """The most that friction of contact i can be under the multipliers lam (m,), N."""

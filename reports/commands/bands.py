@@ -13,6 +13,7 @@ from crossbody.cases.defaults import limits_of
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import Entry, measured
 from crossbody.reports.judging.verdict import limit_for
+from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.runs import choice, jobs
 
 NEAR = (0.7, 1.4)
@@ -20,8 +21,8 @@ NEAR = (0.7, 1.4)
 moves tenfold with the last digit; the largest of three does not."""
 
 
-def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations]]:
-    """What all engines that are installed give on one variant, and the largest of it near their tolerances."""
+def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations, float]]:
+    """What all engines that are installed give on one variant, the largest near their tolerances, and up to when."""
     (case,) = choice.load_cases([name], variant, {})
     wanted = choice.picks(engines.names())
     result = jobs.run_case(case, wanted, tell=print, refine=False)
@@ -37,7 +38,8 @@ def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviati
             for one in (one for one in beside.entries if one.run):
                 key = (one.engine, one.profile)
                 found[key] = _largest(found[key], measured(case, one, result.truth), _known(case, one))
-    return [(case, one, found[one.engine, one.profile]) for one in runs]
+    end = shortened(result.truth).trusted
+    return [(case, one, found[one.engine, one.profile], end) for one in runs]
 
 
 def _known(case: Case, entry: Entry) -> frozenset[str]:

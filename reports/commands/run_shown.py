@@ -120,10 +120,13 @@ def _number(value: float | None) -> str:
 
 def _wrong(run: EngineRun, row: Row) -> str:
     number = f" {row['value']:.4g}{_unit(row)}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
-    return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}. {row['why']}"
+    place = f" ({row['where']})" if row.get("where") else ""
+    return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}{place}. {row['why']}"
 
 
 def _lost(run: EngineRun, row: Row) -> str:
+    if math.isnan(row["band"]):
+        return f"worse than the stored run: {run.label} {row['metric']}. {row['why']}"
     expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
     value = f"{abs(row['value'] - expected):.4g}{_unit(row)} from what is claimed, band {row['band']:.3g}"
     return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"

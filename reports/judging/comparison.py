@@ -17,7 +17,15 @@ from crossbody.engines import Run
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
-from crossbody.reports.judging.stored import Deviations, defaults, deviations, differing, words
+from crossbody.reports.judging.stored import (
+    SAME_END,
+    Deviations,
+    compared_until,
+    defaults,
+    deviations,
+    differing,
+    words,
+)
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import (
     COLUMNS,
@@ -167,7 +175,10 @@ def _entry(run: Entry | Run) -> Entry:
 
 
 def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
-    """Whether the sources of a truth agree as far as they must; none for a truth that has one source and was given."""
+    """Whether the sources of a truth agree as far as they must; none for a truth that has one source and was given.
+
+    One that is known less far than when runs were stored is worse than it was.
+    """
     if math.isnan(truth.allowed):
         return []
     known = case.chaos or truth.horizon
@@ -181,10 +192,14 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     if truth.part < 1.0:
         asked = case.t_end / truth.part
         told.append(f"Followed to {case.t_end:.4g} s of {asked:.4g} s: {truth.short}.")
+    lost = shortened(truth).trusted < compared_until(case) - SAME_END * case.t_end
+    if lost:
+        told.append(f"The stored runs were compared up to {compared_until(case):.4g} s.")
     return [Verdict(
         case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",
         limit=truth.allowed, tier=truth.tier.value, why=" ".join(told), command=command,
         verdict=Word.WITHIN if value <= truth.allowed and not short else Word.OUTSIDE,
+        regression=Regression.LOST if lost else "",
         compared=truth.part * min(truth.trusted / case.t_end, 1.0),
     )]  # fmt: skip
 
@@ -210,7 +225,7 @@ class _Judge:
         self.case, self.entry, self.truth = case, entry, truth
         self.claims: Mapping[str, Claim] = {claim.metric: claim for claim in case.claims}
         self.limits = limits_of(case)
-        self.stored: Deviations = deviations(case, entry)
+        self.stored: Deviations = deviations(case, entry, truth.trusted)
         self.command = f"{command} --engine {entry.engine}:{entry.profile}"
 
     def limit(self, metric: str) -> Limit | None:
@@ -379,7 +394,10 @@ def _row(
     needs = getattr(metric, "NEEDS", "")
     excused = value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
     if value is not None and not excused:
-        return judge_.judged(name, value, metric.UNIT, truth, compared)
+        found = judge_.judged(name, value, metric.UNIT, truth, compared)
+        place = getattr(metric, "where", None)
+        beyond = found.verdict != Word.WITHIN and math.isfinite(value) and value > found.limit
+        return replace(found, where=place(truth, run, judge_.case)) if place and beyond else found
     if name in judge_.claims:
         return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
     if wanted and _shown(metric, truth, judge_.case):

@@ -20,8 +20,9 @@ COARSE, LEAST, MANY = 1e-9, 50, 20
 of a method of order 8 the tightest takes 3 times as many, unless rounding is what its errors are made of."""
 LADDER = (1.0, 10.0)
 """Tolerances that are tried, in units of `Case.tight`; ten times the last is taken without."""
-FEW, FEWEST = 4, 200
-"""Steps that tell what one of an engine costs, and how many a run takes at least, with those that choose its method."""
+FEW, FEWEST, MORE, AMPLE = 4, 200, 2, 1.5
+"""Steps that tell what one of an engine costs; how many a run takes at least, with those that choose its method; by how
+much more are tried next; and how much more than may be paid for before a run counts as too dear."""
 SHORT = {
     Outcome.TIME_LIMIT: "more takes longer than --budget allows",
     Outcome.PAINLEVE: "rigid bodies with dry friction have no motion beyond (Painleve)",
@@ -108,20 +109,27 @@ def estimated(prepare: Callable[..., Run], part: float, most: float) -> tuple[fl
     Args:
         prepare: prepares the first part of the run, with settings.
         part: of the horizon.
-        most: beyond it the first part is not run either.
+        most: beyond it the first part is not run either, or not to its end: what it takes is then at least this.
     """
     prepared = prepare()
-    if "max_steps" in prepared.settings:
-        one = {"method": "Adams"} if "method" in prepared.settings else {}
-        cost, steps = _timed(prepare(max_steps=FEW, **one))
-        if cost / max(steps, 1) * FEWEST > most:
-            return cost / max(steps, 1) * FEWEST, steps
-    cost, steps = _timed(prepared)
-    return cost / part, steps
+    if "max_steps" not in prepared.settings:
+        cost, found = _timed(prepared)
+        return cost / part, found.steps
+    one = {"method": "Adams"} if "method" in prepared.settings else {}
+    cost, found = _timed(prepare(max_steps=FEW, **one))
+    each, steps = cost / max(found.steps, 1), FEWEST
+    if each * FEWEST > most:
+        return each * FEWEST, found.steps
+    while True:
+        cost, found = _timed(prepare(max_steps=min(steps, prepared.settings["max_steps"])))
+        ended = found.outcome is not Outcome.STEP_LIMIT or steps >= prepared.settings["max_steps"]
+        if ended or cost > AMPLE * part * most:
+            return cost / part, found.steps
+        steps *= MORE
 
 
-def _timed(run: Run) -> tuple[float, int]:
+def _timed(run: Run) -> tuple[float, Trajectory]:
     began = process_time()
     found = run.run()
     used, tried = (found.counts.get(name, 0) for name in ("rhs", "tried"))
-    return (process_time() - began) * used / max(used + tried, 1) if tried else process_time() - began, found.steps
+    return (process_time() - began) * (used / max(used + tried, 1) if tried else 1.0), found

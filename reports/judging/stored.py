@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from crossbody.reports.judging.comparison import Entry
 
 FILE = Path(__file__).with_name("stored.json")
+SAME_END = 0.01
+"""Part of the horizon by which a comparison may end elsewhere than the stored one and still be the same."""
 Deviations = Mapping[str, float]
 
 
@@ -28,15 +30,15 @@ def words(settings: Mapping[str, Any]) -> str:
     return " ".join(f"{k}={v:g}" if isinstance(v, float) else f"{k}={v}" for k, v in settings.items())
 
 
-def deviations(case: Case, entry: Entry) -> Deviations:
+def deviations(case: Case, entry: Entry, trusted: float) -> Deviations:
     """Metric -> deviation of the stored run with the same parameters and settings; empty where there is none.
 
-    A number that the stored run did not have is NaN.
+    What was compared up to another instant than `trusted`, s, says nothing of this run. A number that the stored run
+    did not have is NaN.
     """
-    stored = _table().get(case.label, {})
-    if stored.get("parameters") != _digest(case):
+    if not abs(compared_until(case) - min(trusted, case.t_end)) <= SAME_END * case.t_end:
         return {}
-    run = stored["runs"].get(f"{entry.engine}:{entry.profile}")
+    run = _table()[case.label]["runs"].get(f"{entry.engine}:{entry.profile}")
     if run is None or run["settings"] != words(entry.settings):
         return {}
     return {metric: float(value) for metric, value in run["deviations"].items()}
@@ -44,10 +46,15 @@ def deviations(case: Case, entry: Entry) -> Deviations:
 
 def defaults(case: Case, entry: Entry) -> str:
     """Settings, in words, that the engine had by itself in the stored run with the same parameters; empty without."""
-    stored = _table().get(case.label, {})
-    if stored.get("parameters") != _digest(case):
+    if math.isnan(compared_until(case)):
         return ""
-    return str(stored["runs"].get(f"{entry.engine}:{entry.profile}", {}).get("settings", ""))
+    return str(_table()[case.label]["runs"].get(f"{entry.engine}:{entry.profile}", {}).get("settings", ""))
+
+
+def compared_until(case: Case) -> float:
+    """Return up to when the stored runs with the same parameters were compared, s; NaN without any."""
+    stored = _table().get(case.label, {})
+    return float(stored.get("compared", case.t_end)) if stored.get("parameters") == _digest(case) else math.nan
 
 
 def differing(case: Case, entry: Entry) -> frozenset[str]:
@@ -67,18 +74,21 @@ def _digest(case: Case) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def write(measured: Iterable[tuple[Case, Entry, Deviations]]) -> None:
+def write(measured: Iterable[tuple[Case, Entry, Deviations, float]]) -> None:
     """Put runs in the place of those that are stored of the same cases and engines; others stay.
 
-    So do runs with the same parameters of engines that are not installed here.
+    So do runs with the same parameters, compared as far, of engines that are not installed here.
+
+    Args:
+        measured: of each run its case, its entry, metric -> deviation, and up to when it was compared, s.
     """
     table = dict(_table())
     fresh: dict[str, Any] = {}
-    for case, entry, found in measured:
+    for case, entry, found, trusted in measured:
         if case.label not in fresh:
-            old, digest = table.get(case.label, {}), _digest(case)
-            kept = dict(old["runs"]) if old.get("parameters") == digest else {}
-            fresh[case.label] = {"parameters": digest, "runs": kept}
+            old, head = table.get(case.label, {}), {"parameters": _digest(case), **_end(case, trusted)}
+            kept = dict(old["runs"]) if {k: v for k, v in old.items() if k != "runs"} == head else {}
+            fresh[case.label] = head | {"runs": kept}
         fresh[case.label]["runs"][f"{entry.engine}:{entry.profile}"] = {
             "settings": words(entry.settings),
             "deviations": {metric: _short(value) for metric, value in sorted(found.items())},
@@ -88,10 +98,15 @@ def write(measured: Iterable[tuple[Case, Entry, Deviations]]) -> None:
     _table.cache_clear()
 
 
+def _end(case: Case, trusted: float) -> dict[str, float]:
+    return {"compared": float(f"{trusted:.3g}")} if trusted < case.t_end else {}
+
+
 def _block(stored: Mapping[str, Any]) -> str:
     """One case, a line an engine."""
     runs = ",\n  ".join(f"{json.dumps(who)}: {json.dumps(run)}" for who, run in stored["runs"].items())
-    return f'{{"parameters": {json.dumps(stored["parameters"])}, "runs": {{\n  {runs}}}}}'
+    head = json.dumps({name: value for name, value in stored.items() if name != "runs"})
+    return f'{head[:-1]}, "runs": {{\n  {runs}}}}}'
 
 
 def _short(value: float) -> float | str:

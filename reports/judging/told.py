@@ -119,6 +119,7 @@ def _off(run: EngineRun, row: Row) -> str:
     """A number of a run that is off, in a few words."""
     times = share(row)
     size = f"{row['value']:.2g}, {times:.2g} times its limit" if math.isfinite(times) else row["verdict"]
+    size += f": {row['where']}" if row.get("where") else ""
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
 
 

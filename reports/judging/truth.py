@@ -174,7 +174,7 @@ def _witness(case: Case, limit: float) -> Trajectory | str:
         first, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
         cost, steps = estimated(partial(pinocchio.prepare, first, "law", rtol=rtol), SHARE, limit)
         if cost > limit:
-            return f"Pinocchio would share the scene alone, and take about {cost:.0f} s"
+            return f"Pinocchio would share the scene alone, and take about {cost:.0f} s or more"
         # Contacts later on may want far more steps than the first part.
         most = max(1000, int(limit * steps / (SHARE * cost)))
         run = pinocchio.prepare(case, "law", rtol=rtol, max_steps=most).run()

@@ -66,6 +66,7 @@ class Verdict:
             NaN where none is stored.
         regression: "kept" or "lost" by that band; empty without one.
         known: what the number is known to, of a part of an error; NaN where nothing is said. One below it is none.
+        where: of what the number is and when, in its own unit, where it is beyond its limit and its metric can say so.
     """
 
     case: str
@@ -86,6 +87,7 @@ class Verdict:
     band: float = math.nan
     regression: str = ""
     known: float = math.nan
+    where: str = ""
 
     def row(self) -> Row:
         """As plain values."""

@@ -7,7 +7,8 @@ A metric is a module with a docstring whose first line says what it measures, an
     measure(truth, run, case)       the number; None where there is none (no contact, another mechanism, ...), NaN where
                                     the run does not show what it needs
 
-and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name. What the runs of
+and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name; if it can say of
+what the number is, `where(truth, run, case)`, in a few words. What the runs of
 one mechanism alone show is data of its cases (`crossbody.cases.metric`); what any case may claim of a run alone stands
 together in `_of_run`, and what only contacts with friction have in `_of_friction`.
 """

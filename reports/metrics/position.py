@@ -27,11 +27,23 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
     A quaternion is told by the angle between both, rad, since q and -q are the same rotation.
     """
+    off, _ = _errors(truth, run, case)
+    return float(np.max(off / scale_of(truth.trajectory, case))) if len(off) else None
+
+
+def where(truth: Truth, run: Trajectory, case: Case) -> str:
+    """Say which coordinate the number is of, how far it is off in its own unit, and when."""
+    off, t = _errors(truth, run, case)
+    i, j = np.unravel_index(np.argmax(off / scale_of(truth.trajectory, case)), off.shape)
+    unit = "rad" if j in case.quaternions else case.coordinates[j].unit
+    name = case.coordinates[j].name.removesuffix(" qw") if j in case.quaternions else case.coordinates[j].name
+    return f"{name} by {off[i, j]:.2g} {unit} at {t[i]:.3g} s"
+
+
+def _errors(truth: Truth, run: Trajectory, case: Case) -> tuple[Floats, Floats]:
+    """Return how far samples are off (n, nq), and their instants (n,), s."""
     inside, exact = aligned(truth, run)
-    if not inside.any():
-        return None
-    off = differences(run.q[inside], exact.q, case.quaternions)
-    return float(np.max(off / scale_of(truth.trajectory, case)))
+    return differences(run.q[inside], exact.q, case.quaternions), run.t[inside]
 
 
 def scale_of(exact: Trajectory, case: Case) -> Floats:

@@ -5,11 +5,13 @@ It asks nothing of the truth or the law, so that it judges engines that follow a
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from crossbody.cases.rotations import ways
+from crossbody.reports.measuring.equations import finite
 from crossbody.reports.measuring.scale import least, of_like
 
 if TYPE_CHECKING:
@@ -30,10 +32,12 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
     Errors of the rule alternate where the motion bends to and fro; a factor on v does not. What turns in space moves
     about its own axes, as its velocity counts; between samples that are too far apart nothing is told of it. None where
-    nothing moves.
+    nothing moves, NaN where a state is no number.
     """
     if len(run.t) < 2:
         return None
+    if not finite(run):
+        return math.nan
     mean = 0.5 * (run.v[1:] + run.v[:-1])
     moved, rated = ways(run.q, case.quaternions), mean * np.diff(run.t)[:, None]
     for i, at in enumerate(case.quaternions):  # i of them before it have an entry more than rates

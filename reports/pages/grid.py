@@ -174,7 +174,8 @@ def _value(row: Row | None, page: str) -> Cell:
     allowed = f", limit {number(limit)}" if limit is not None and limit == limit else ""
     below, value = bounded(row["value"], row["known"])
     unit = "" if row["unit"] == "1" else f" {row['unit']}"
-    title = f"{row['who']}, {row['metric']}: {below}{number(value)}{unit}{allowed}. {row['why']}"
+    place = f" ({row['where']})" if row.get("where") else ""
+    title = f"{row['who']}, {row['metric']}: {below}{number(value)}{unit}{allowed}{place}. {row['why']}"
     anchor = f"{row['who']}~{row['metric']}"
     text = below + short(value)
     return Cell(title=title, word=row["verdict"], text=text, page=page, anchor=anchor, heat=heat_of(row))

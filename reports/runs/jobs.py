@@ -210,7 +210,7 @@ def _dear(case: Case, pick: Pick, asked: Mapping[str, Value], most: float) -> st
         return ""
     first = replace(case, t_end=FIRST * case.t_end)
     cost, _ = estimated(lambda **more: prepare(first, pick, {**asked, **more}), FIRST, most)
-    return "" if cost <= most else _too_dear(pick, f"about {cost:.0f} s")
+    return "" if cost <= most else _too_dear(pick, f"about {cost:.0f} s or more")
 
 
 def _too_dear(pick: Pick, cost: str) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -98,7 +99,7 @@ def _save_traces(out: Path, traces: Sequence[Trace]) -> None:
 
 def write_table(stem: Path, rows: pd.DataFrame, provenance: Mapping[str, Any]) -> None:
     """One table as Parquet (provenance in its metadata), CSV and JSON (provenance beside the rows)."""
-    rows.to_csv(stem.with_suffix(".csv"), index=False)
+    rows.to_csv(stem.with_suffix(".csv"), index=False, quoting=_quoting(rows.to_numpy().ravel()))
     plain = json.loads(rows.to_json(orient="records", double_precision=15))
     _write_both(stem, pa.Table.from_pandas(rows, preserve_index=False), plain, provenance)
 
@@ -109,16 +110,22 @@ def write_rows(stem: Path, rows: Sequence[Row], kinds: Mapping[str, type], prove
     Parquet is made of what the CSV says: `pa.array` imports pandas (.3 s) to see whether it is given one of its own.
     """
     path = stem.with_suffix(".csv")
+    told = [["" if value != value else value for value in (row[name] for name in kinds)] for row in rows]
     with path.open("w", encoding="utf-8", newline="") as file:
-        lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(kinds)
-        lines.writerows(["" if value != value else value for value in (row[name] for name in kinds)] for row in rows)
+        lines = csv.writer(file, lineterminator="\n", quoting=_quoting(chain(*told)))
+        lines.writerows([kinds, *told])
     table = read_csv(
         path,
         parse_options=ParseOptions(newlines_in_values=True),
         convert_options=ConvertOptions(column_types={name: _ARROW[kind] for name, kind in kinds.items()}),
     )
     _write_both(stem, table, [{name: finite(row[name]) for name in kinds} for row in rows], provenance)
+
+
+def _quoting(cells: Iterable[object]) -> Literal[0, 1]:
+    """What is quoted: a carriage return is plain text to the writer, and the end of a line to what reads it."""
+    returns = any("\r" in cell for cell in cells if isinstance(cell, str))
+    return csv.QUOTE_ALL if returns else csv.QUOTE_MINIMAL
 
 
 def _write_both(stem: Path, arrow: pa.Table, plain: Sequence[Row], provenance: Mapping[str, Any]) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from crossbody.cases import InvalidValue
 from crossbody.hw import Sensor, unlagged
 from crossbody.hw.replaying import measures as _measures
+from crossbody.hw.replaying import tracked
 from crossbody.hw.replaying.sensors import lagged
 from crossbody.hw.windows.impacts import Impacts, impacts, least_of, matched
 from crossbody.hw.windows.rates import derivatives, felt
@@ -107,6 +110,31 @@ def test_sensors_delay_and_round() -> None:
         Sensor(rate=-1.0)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_late_sensor_shows_what_was_true_and_before_that_the_start(seed: int) -> None:
+    """Held or cubic between samples of any distance; rounded to its counts, or following by its lag."""
+    random = np.random.default_rng(seed)
+    t = random.uniform(-3.0, 3.0) + np.cumsum(random.uniform(0.5, 1.5, 60)) * 0.01
+    lines = [np.polynomial.Polynomial(c, domain=[t[0], t[-1]]) for c in random.normal(size=(2, 4))]
+    x, xd = (np.column_stack([line(t) for line in each]) for each in (lines, [line.deriv() for line in lines]))
+    delay, quantum, ks = random.uniform(0.005, 0.1), random.uniform(0.01, 0.2), random.uniform(20.0, 200.0)
+    then = np.maximum(t - delay, t[0])
+    last = [max(i for i in range(len(t)) if t[i] <= at) for at in then]
+    np.testing.assert_array_equal(Sensor(delay=delay).read(t, x), x[last])
+    smooth = Sensor(delay=delay).read(t, x, xd)
+    np.testing.assert_allclose(smooth, np.column_stack([line(then) for line in lines]), atol=1e-10)
+    rounded = Sensor(delay=delay, quantum=quantum).read(t, x, xd)
+    np.testing.assert_allclose(rounded / quantum, np.round(smooth / quantum), atol=1e-9)
+    for rate in (None, xd):
+        fine = np.concatenate([np.linspace(a, b, 200, endpoint=False) for a, b in pairwise(t)])
+        k = np.searchsorted(t, fine, side="right") - 1
+        share = 0.0 if rate is None else ((fine - t[k]) / (t[k + 1] - t[k]))[:, None]
+        felt_, y = x[k] + share * (x[k + 1] - x[k]), [x[0]]
+        for step, now in zip(np.diff(np.append(fine, t[-1])), felt_, strict=True):
+            y.append(y[-1] + (1.0 - np.exp(-ks * step)) * (now - y[-1]))
+        np.testing.assert_allclose(Sensor(rate=ks).read(t, x, rate), y[::200], atol=1e-3)
+
+
 def test_polynomials_give_rates_and_say_how_noisy_they_are() -> None:
     random = np.random.default_rng(5)
     t = np.sort(STEP * (np.arange(400) + 0.1 * random.standard_normal(400)))
@@ -176,3 +204,30 @@ def test_the_instant_and_the_jump_of_an_impact_are_known_between_samples(seed: i
     found = impacts(t, y, least=1e-3)
     np.testing.assert_allclose(found.t, when, atol=1e-12)
     np.testing.assert_allclose(found.jump, jumps, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_means_of_held_inputs_are_those_of_any_instants(seed: int) -> None:
+    """From each to the next, the last as long as the one before; beyond its own times an input holds."""
+    random = np.random.default_rng(seed)
+    times = random.uniform(-1.0, 1.0) + np.cumsum(random.uniform(0.01, 0.1, 30))
+    held = random.normal(size=(30, 2))
+    t = np.sort(random.uniform(times[0] - 0.1, times[-1] + 0.1, 12))
+    found = tracked._means(times, held, t)
+    for i, (a, b) in enumerate(pairwise([*t, 2.0 * t[-1] - t[-2]])):
+        cuts = np.unique([a, b, *times[(times > a) & (times < b)]])
+        now = [held[max(int(np.sum(times <= at)) - 1, 0)] for at in cuts[:-1]]
+        np.testing.assert_allclose(found[i], np.diff(cuts) @ np.array(now) / (b - a), atol=1e-12)
+
+
+@pytest.mark.parametrize("pull", [-9.81, 0.0, 4.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_what_no_noise_and_no_weight_is_an_impact(seed: int, pull: float) -> None:
+    """Six deviations of the second differences, whose variance is six times that of a sample; or a part of the blow."""
+    random, t = np.random.default_rng(seed), STEP * np.arange(2000)
+    noise = 10.0 ** random.uniform(-8.0, -5.0)
+    y = 0.5 * pull * t**2 + noise * random.normal(size=len(t))
+    clear = 6.0 * np.sqrt(6.0) * noise / STEP**2
+    assert least_of(t, y) == pytest.approx(max(clear, 0.25 * pull), rel=0.1)
+    hit = 100.0 * clear
+    assert least_of(t, y + hit * STEP * np.maximum(t - t[900], 0.0)) == pytest.approx(0.25 * (hit + pull), rel=0.1)

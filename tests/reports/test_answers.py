@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -54,7 +55,8 @@ def test_what_is_taken_from_an_answer_is_what_would_have_been_integrated(asked: 
         assert count[0] == 1
 
 
-def test_without_room_each_question_is_answered_alone() -> None:
+def test_without_room_each_question_is_answered_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(answers, "ROOM", 1 << 14)
     sizes: list[int] = []
 
     def integrate(times: Floats) -> Trajectory:

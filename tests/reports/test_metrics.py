@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Ledger, Mode, Tier, Trajectory, load
+from crossbody.cases import Case, Event, Ledger, Mode, Tier, Trajectory, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
@@ -131,6 +131,22 @@ def test_energy_made_by_the_law_is_the_gain_of_every_bounce() -> None:
     assert measure("energy_law", truth, truth.trajectory, case) == pytest.approx(len(ended) * gain / size, rel=1e-9)
     assert measure("energy_per_bounce", truth, truth.trajectory, case) == pytest.approx(gain, rel=1e-10)
     assert measure("energy_integrator", truth, truth.trajectory, case) < 1e-12
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.4, 0.9])
+def test_energy_of_switching_is_all_that_a_row_of_balls_gains_without_damping(gap: float) -> None:
+    """Of constant mass and rows, once nothing pushes any more."""
+    plain = load("newtons_cradle", "sliders", n=3, zeta=0.0)
+    case = load(
+        "newtons_cradle", "sliders", n=3, zeta=0.0, collisions="resolved", t_end=2.0 * plain.t_end,
+        gap=gap * plain.number("speed") / np.sqrt(plain.number("a0")),
+    )  # fmt: skip
+    truth = truth_of(case)
+    energy = truth.trajectory.total_energy
+    gained = (energy[-1] - energy[0]) / truth.trajectory.energy[:, 0].max()
+    assert (gained > 0.01) or gap == 0.0
+    assert measure("energy_switching", truth, truth.trajectory, case) == pytest.approx(gained, abs=1e-7)
+    assert measure("energy_switching_error", truth, truth.trajectory, case) == pytest.approx(0.0, abs=1e-7)
 
 
 def test_without_a_ledger_nothing_is_said_of_it(truth: Truth, case: Case) -> None:
@@ -299,6 +315,39 @@ def test_the_worst_sample_of_friction_counts(name: str, parts: tuple[float, floa
     right, worst = found({}), found({middle: parts[1]})
     assert worst > 1e3 * max(right, 1e-12)
     assert found({first: parts[0], middle: parts[1]}) == pytest.approx(worst)
+
+
+@pytest.mark.parametrize("signal", ["q", "v"])
+@pytest.mark.parametrize("name", ["energy_residual", "gap_residual", "law_residual", "rate_residual", "position"])
+def test_one_state_that_is_no_number_leaves_none(name: str, signal: str, truth: Truth, case: Case) -> None:
+    """Among more samples than are looked at."""
+    run = truth.trajectory
+    assert len(run.t) > 1000
+    for k in np.random.default_rng(6).integers(1, len(run.t), 5):
+        values = getattr(run, signal).copy()
+        values[k] = np.nan
+        if (name, signal) != ("position", "v"):
+            assert np.isnan(measure(name, truth, replace(run, **{signal: values}), case))
+
+
+def test_a_start_in_contact_is_no_touch_that_is_off_its_surface(truth: Truth, case: Case) -> None:
+    run = truth.trajectory
+    begun = (Event(t=0.0, contact=0, before=Mode.FREE, after=Mode.CONTACT), *run.events)
+    assert run.gap[0, 0] > 0.5
+    assert (
+        measure("event_gap", truth, replace(run, events=begun), case) == measure("event_gap", truth, run, case) < 1e-6
+    )
+    later = tuple(replace(e, t=0.01 * case.t_end) for e in begun)
+    assert measure("event_gap", truth, replace(run, events=later), case) > 1.0
+
+
+@pytest.mark.parametrize("level", [-3e6, 3e6])
+def test_an_energy_is_measured_by_no_less_than_rounding_leaves_of_it(level: float, truth: Truth) -> None:
+    run = truth.trajectory
+    still = replace(
+        run, q=np.ones_like(run.q), energy=np.full_like(run.energy, (0.0, level)), lam=np.zeros_like(run.lam)
+    )  # fmt: skip
+    assert scale.energy(still) == pytest.approx(1e-8 * 3e6)
 
 
 @pytest.mark.parametrize("part", [0.05, 0.5, 0.95])

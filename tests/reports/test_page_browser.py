@@ -15,8 +15,9 @@ from ladder import ladder
 from resting import plate
 from study_pages import studies
 
-from crossbody.cases import from_scene, load
+from crossbody.cases import Case, from_scene, load
 from crossbody.cases.scene import Body, Joint, Scene, Shape
+from crossbody.engines import Run
 from crossbody.engines import load as load_engine
 from crossbody.reports import sections
 from crossbody.reports.judging.comparison import Entry
@@ -70,6 +71,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Brows
     opened.close()
 
 
+NEXT_FRAME = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 DRAWN = "[...document.querySelectorAll('.plot')].filter((box) => 'drawn' in box.dataset).length"
 
 
@@ -110,7 +112,7 @@ def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browse
         "(() => { const view = document.querySelector('[data-view]'); view.value = 'beside';"
         " view.dispatchEvent(new Event('change')); })()"
     )
-    browser.js("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    browser.js(NEXT_FRAME)
     assert browser.picture(".player canvas") != side
     assert browser.complaints() == []
 
@@ -119,11 +121,10 @@ def test_one_steps_from_event_to_event_and_sees_differences_larger(out: Path, br
     browser.open(out / CASE)
     browser.js("document.querySelector('.player').scrollIntoView()")
     browser.wait(DRAWN)
-    drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
     def step(way: str) -> float:
         browser.js(f"document.querySelector('[data-{way}]').click()")
-        browser.js(drawn)
+        browser.js(NEXT_FRAME)
         return float(str(browser.js("document.querySelector('[data-readout]').textContent")).split()[2])
 
     events = sorted({event.t for event in truth_of(load("bouncing_ball", "linear")).trajectory.events})
@@ -136,36 +137,39 @@ def test_one_steps_from_event_to_event_and_sees_differences_larger(out: Path, br
         "(() => { const field = document.querySelector('[data-differences]'); field.value = '100';"
         " field.dispatchEvent(new Event('change')); })()"
     )
-    browser.js(drawn)
+    browser.js(NEXT_FRAME)
     assert browser.picture(".player canvas") != plain
     assert browser.complaints() == []
+
+
+def page_of(case: Case, out: Path, *runs: Run) -> Path:
+    """Write the page of one case and its runs into a folder that is made here."""
+    entries = tuple(Entry(engine=run.engine, profile=run.profile, run=run.run()) for run in runs)
+    results = [CaseResult(case=case, truth=truth_of(case), entries=entries)]
+    with folder(out) as made:
+        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
+        site.write(made)
+    (page,) = out.glob("case-*.html")
+    return page
 
 
 @pytest.fixture(scope="module")
 def solids(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of a scene: a plate that lies on a floor."""
     case = plate([(x, y, 0.0) for x in (-0.1, 0.1) for y in (-0.1, 0.1)], height=0.02, t_end=0.1)
-    entry = Entry(engine="reference", profile="compiled", run=load_engine("reference").prepare(case, "compiled").run())
-    results = [CaseResult(case=case, truth=truth_of(case), entries=(entry,))]
-    path = tmp_path_factory.mktemp("solids") / "out"
-    with folder(path) as made:
-        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
-        site.write(made)
-    (page,) = path.glob("case-*.html")
-    return page
+    return page_of(case, tmp_path_factory.mktemp("solids") / "out", load_engine("reference").prepare(case, "compiled"))
 
 
 def test_a_scene_is_turned_and_looked_at_from_near(solids: Path, browser: chromium.Browser) -> None:
     browser.open(solids)
     browser.js("document.querySelector('.player').scrollIntoView()")
-    drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
     canvas = "document.querySelector('.player canvas')"
-    browser.js(drawn)
+    browser.js(NEXT_FRAME)
     first = browser.picture(".player canvas")
 
     def after(action: str) -> bytes:
         browser.js(f"{{ const canvas = {canvas}; {action} }}")
-        browser.js(drawn)
+        browser.js(NEXT_FRAME)
         return browser.picture(".player canvas")
 
     wheel = "canvas.dispatchEvent(new WheelEvent('wheel', {deltaY: -400, cancelable: true}));"
@@ -184,13 +188,7 @@ def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium
     shape = Shape(name="bar", body="rod", type="capsule", size=(0.05, 0.5, 0.0), position=(0.0, 0.0, 0.5))
     hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0))
     case = from_scene(Scene(bodies=(rod,), joints=(hinge,), shapes=(shape,)), q0=[0.1], t_end=0.5)
-    truth = truth_of(case)
-    results = [CaseResult(case=case, truth=truth, entries=())]
-    with folder(tmp_path / "out") as made:
-        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
-        site.write(made)
-    (page,) = (tmp_path / "out").glob("case-*.html")
-    browser.open(page)
+    browser.open(page_of(case, tmp_path / "out"))
     browser.js("document.querySelector('.player').scrollIntoView()")
     edge = (
         "(() => { const c = document.querySelector('.player canvas'); const g = c.getContext('2d');"
@@ -204,7 +202,7 @@ def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium
     for key in ("", "ArrowLeft", "ArrowUp", "ArrowUp", "ArrowUp", "ArrowUp", "ArrowLeft"):
         press = f"new KeyboardEvent('keydown', {{key: '{key}'}})"
         browser.js(f"document.querySelector('.player canvas').dispatchEvent({press})")
-        browser.js("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        browser.js(NEXT_FRAME)
         at_edge, drawn = browser.js(edge)
         assert at_edge == 1
         assert drawn > 10
@@ -242,15 +240,7 @@ def test_thirty_bodies_play_as_smoothly_as_a_page_that_does_nothing(tmp_path: Pa
         q0=[x for place in places for x in (*place, 1.0, 0.0, 0.0, 0.0)],
         v0=np.tile([0.0, 0.0, 1.0, 2.0, 1.0, 3.0], 30),
     )  # fmt: skip
-    run = load_engine("reference").prepare(case, "compiled").run()
-    results = [
-        CaseResult(case=case, truth=truth_of(case), entries=(Entry(engine="reference", profile="compiled", run=run),))
-    ]
-    with folder(tmp_path / "out") as made:
-        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
-        site.write(made)
-    (page,) = (tmp_path / "out").glob("case-*.html")
-    browser.open(page)
+    browser.open(page_of(case, tmp_path / "out", load_engine("reference").prepare(case, "compiled")))
     browser.js("document.querySelector('.player').scrollIntoView()")
     still, _ = browser.js(FRAMES)
     browser.js("document.querySelector('[data-play]').click()")
@@ -396,12 +386,11 @@ def test_engines_are_laid_over_each_other_and_side_by_side_in_space(solids: Path
     """A hidden engine is not drawn in either view; no button leads anywhere."""
     browser.open(solids)
     browser.js("document.querySelector('.player').scrollIntoView()")
-    drawn = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
     browser.wait("document.querySelector('[data-speed]').options.length > 0")
 
     def seen(action: str) -> bytes:
         browser.js(action)
-        browser.js(drawn)
+        browser.js(NEXT_FRAME)
         return browser.picture(".player canvas")
 
     field = "document.querySelector('[data-view]')"

@@ -277,6 +277,16 @@ def test_one_wrong_coordinate_of_several_is_the_error_of_a_run(seed: int) -> Non
         assert error(case, replace(run, q=q), asked).value == pytest.approx(1e-3, rel=1e-6), k
 
 
+@pytest.mark.parametrize("at", [0, 1, 7, -2, -1])
+def test_one_wrong_sample_is_the_error_of_a_run_wherever_it_is(at: int) -> None:
+    case = cases.load("newtons_cradle", "sliders", n=3)
+    assert case.closed_form is not None
+    run = case.closed_form(instants(case.t_end))
+    q = run.q.copy()
+    q[at, 1] += 1e-3 * np.abs(run.q).max()
+    assert error(case, replace(run, q=q), Asked(limit=1.0, near=lambda: case)).value == pytest.approx(1e-3, rel=1e-6)
+
+
 def test_within_is_a_run_that_ended_well_with_an_error_that_is_known_and_small() -> None:
     values, open_, tiers = (math.nan, math.inf, 1e-3, 1e-9), (math.nan, 1e-3, 1e-9), ("", "C")
     for value, left_open, tier, outcome in itertools.product(values, open_, tiers, Outcome):

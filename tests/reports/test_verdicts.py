@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import hypothesis.strategies as st
@@ -18,12 +19,15 @@ from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports import metrics
 from crossbody.reports.commands import bands
-from crossbody.reports.judging import comparison
+from crossbody.reports.judging import comparison, stored
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
-from crossbody.reports.judging.verdict import FACTOR, Word, band, exit_code, judge, limit_for
+from crossbody.reports.judging.verdict import FACTOR, Regression, Word, band, exit_code, judge, limit_for
+from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.runs import jobs
+from crossbody.reports.runs.choice import picks
 
 LIMIT = Limit(metric="position", value=1e-3, why="because")
 KNOWN = replace(LIMIT, known="it is known to do that", known_size=1.0)
@@ -349,15 +353,30 @@ def test_a_record_ends_at_the_horizon_whatever_it_says_of_itself(
     assert (word(rows, "finished") == Word.WITHIN) == reached
 
 
+@pytest.mark.parametrize(("part", "lost"), [(1.0, False), (0.995, False), (0.9, True)])
+def test_a_truth_that_is_known_less_far_than_when_runs_were_stored_is_worse(part: float, lost: bool) -> None:
+    """What is not compared any more is no regression of an engine, and must not go unseen."""
+    shipped = load("bouncing_ball", "linear")
+    truth = replace(truth_of(shipped), trusted=part * shipped.t_end, allowed=1.0, agreement={"position": 0.0})
+    entry = Entry(
+        engine="reference", profile="compiled", run=truth.trajectory,
+        settings=engines.load("reference").prepare(shipped, "compiled").settings,
+    )  # fmt: skip
+    rows = judged(shipped, [entry], truth, "")
+    (row,) = (each for each in rows if each.engine == TRUTH)
+    assert (row.regression == Regression.LOST) == lost == ("stored runs" in row.why)
+    assert all(math.isnan(each.band) == lost for each in rows if each.metric == "position")
+
+
 @pytest.mark.parametrize("change", [{"parameters": {"height": 2.0}}, {"settings": {"rtol": 1e-3}}])
 def test_what_was_stored_of_other_parameters_or_settings_is_not_taken(change: dict[str, Any]) -> None:
     engine = engines.load("reference")
     shipped = load("bouncing_ball", "linear")
     entry = Entry(engine="reference", profile="compiled", settings=engine.prepare(shipped, "compiled").settings)
-    assert deviations(shipped, entry)
+    assert deviations(shipped, entry, shipped.t_end)
     other = load("bouncing_ball", "linear", **change.get("parameters", {}))
     settings = {**entry.settings, **change.get("settings", {})}
-    assert deviations(other, replace(entry, settings=settings)) == {}
+    assert deviations(other, replace(entry, settings=settings), other.t_end) == {}
 
 
 @pytest.mark.parametrize(("default", "scale", "told"), [(True, 1.0, 0), (True, 2.0, 1), (False, 2.0, 0)])
@@ -369,6 +388,18 @@ def test_an_engine_whose_own_settings_have_changed_is_outside(default: bool, sca
     rows = [row for row in judged(shipped, [entry], truth_of(shipped), "") if row.metric == "settings"]
     assert [row.verdict for row in rows] == told * [Word.OUTSIDE]
     assert all("rtol=2e-09" in row.why for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("asked", "own"),
+    [({}, [True, True]), ({"reference:cvode.rtol": 1e-7}, [True, False])],
+)
+def test_settings_are_an_engines_own_unless_some_that_it_has_are_asked_for(
+    asked: dict[str, float], own: list[bool], case: Case
+) -> None:
+    wanted = picks(["reference:compiled", "reference:cvode"])
+    entries = jobs.run_case(case, wanted, settings=asked, refine=False).entries
+    assert [entry.default for entry in entries] == own
 
 
 @pytest.mark.parametrize("claimed", [False, True])
@@ -443,7 +474,7 @@ def test_a_known_difference_of_the_audit_has_a_quantity_and_a_size(quantity: str
     shipped = load("bouncing_ball", "linear")
     settings = engines.load("mujoco").prepare(shipped, "default").settings
     entry = Entry(engine="mujoco", profile="default", settings=settings, run=truth_of(shipped).trajectory)
-    off = factor * deviations(shipped, entry)["audit lam"]
+    off = factor * deviations(shipped, entry, shipped.t_end)["audit lam"]
     row = AuditRow(quantity=quantity, mine="", theirs="", difference=off, tolerance=1e-10)
     found = {each.metric: each for each in judged(shipped, [replace(entry, audit=(row,))], truth_of(shipped), "")}
     assert found["audit"].verdict == word
@@ -502,3 +533,25 @@ def test_a_known_deviation_is_stored_as_the_run_has_it_and_anything_else_at_its_
     assert "start_error" not in known
     found = bands._largest({"a": 1.0, "b": 1.0, "c": 1.0}, {"a": 3.0, "b": 3.0}, frozenset({"a"}))
     assert found == {"a": 1.0, "b": 3.0, "c": 1.0}
+
+
+@pytest.mark.parametrize("behind", [1e-4, 1e-3, 1e-2])
+def test_what_is_stored_of_a_truth_that_ends_soon_after_an_event_judges_the_same_run(
+    behind: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Comparisons end between two events, so that their numbers can agree: not where the truth is no longer known."""
+    shipped = load("bouncing_ball", "linear")
+    whole = truth_of(shipped)
+    late = next(event.t for event in whole.trajectory.events if event.t > 0.6 * shipped.t_end)
+    truth = replace(whole, trusted=late + behind, allowed=1.0, agreement={"position": 0.0})
+    run = engines.load("reference").prepare(shipped, "compiled").run()
+    entry = Entry(engine="reference", profile="compiled", run=run)
+    result = jobs.CaseResult(case=shipped, truth=truth, entries=(entry,))
+    monkeypatch.setattr(stored, "FILE", tmp_path / "stored.json")
+    monkeypatch.setattr(jobs, "run_case", lambda *_, **__: result)
+    stored._table.cache_clear()
+    stored.write(bands._measured("bouncing_ball", "linear"))
+    rows = {each.metric: each for each in judged(shipped, [entry], truth, "")}
+    stored._table.cache_clear()
+    assert rows["position"].regression == Regression.KEPT
+    assert rows["truth"].regression == ""

@@ -160,7 +160,7 @@ def _gaps(t, q, v, p, h, hd):  # type: ignore[no-untyped-def]
         h[i], hd[i] = 0.0 * q[0], 0.0 * q[0]
         for c in range(n):
             hd[i] += p[first + n * i + c] * v[c]
-            if i < p[0].real:
+            if i < p[0].real or i >= p[len(p) - 1].real:
                 h[i] += p[first + n * i + c] * q[c]
 
 
@@ -171,7 +171,7 @@ def _rows(t, q, v, p, w, idx, na, H, h, Hdv):  # type: ignore[no-untyped-def]
         h[j], Hdv[j] = 0.0 * q[0], 0.0 * q[0]
         for c in range(n):
             H[j, c] = p[first + n * idx[j] + c]
-            if idx[j] < p[0].real:
+            if idx[j] < p[0].real or idx[j] >= p[len(p) - 1].real:
                 h[j] += H[j, c] * q[c]
 
 
@@ -184,18 +184,23 @@ def _energy(q, v, p, e):  # type: ignore[no-untyped-def]
 
 
 def linear(H: Any, force: Any, mu: float, contacts: int, *, spring: Any = None, drift: Any = 0.0,
-           a0: float = 1e4, a1: float = 200.0) -> System:  # fmt: skip
-    """Return unit masses under constant forces and springs: normal rows of H first, then the tangential ones."""
-    H, force = np.atleast_2d(np.array(H, dtype=float)), np.array(force, dtype=float)
+           a0: float = 1e4, a1: float = 200.0, loops: Any = ()) -> System:  # fmt: skip
+    """Return unit masses under constant forces and springs: normal rows of H first, then the tangential ones.
+
+    Rows of `loops` are always on.
+    """
+    H, force, held = np.atleast_2d(np.array(H, dtype=float)), np.array(force, dtype=float), len(loops)
     nc, ways = len(H), len(H) // contacts - 1
+    H = np.vstack([H, *np.atleast_2d(loops)]) if held else H
     springs = np.zeros(len(force)) if spring is None else np.array(spring, dtype=float)
     return System(
         n=len(force), dynamics=_dynamics, gaps=_gaps, rows=_rows, energy=_energy,
-        parameters=np.concatenate([[contacts], force, springs, H.ravel()]),
-        a0=[a0] * contacts + [0.0] * (nc - contacts), a1=[a1] * nc,
-        follows=[-1] * contacts + [i // ways for i in range(nc - contacts)],
-        mu=[np.inf] * contacts + [mu] * (nc - contacts),
-        drift=np.concatenate([np.zeros(contacts), np.broadcast_to(drift, nc - contacts)]),
+        parameters=np.concatenate([[contacts], force, springs, H.ravel(), [nc]]),
+        a0=[a0] * contacts + [0.0] * (nc - contacts + held), a1=[a1] * (nc + held),
+        follows=[-1] * contacts + [i // ways for i in range(nc - contacts)] + [-1] * held,
+        mu=[np.inf] * contacts + [mu] * (nc - contacts) + [np.inf] * held,
+        unilateral=[True] * nc + [False] * held,
+        drift=np.concatenate([np.zeros(contacts), np.broadcast_to(drift, nc - contacts), np.zeros(held)]),
     )  # fmt: skip
 
 

@@ -1,0 +1,93 @@
+"""Scatter of estimates beside the same with whole matrices, over designs, layouts and residuals at random."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag, toeplitz
+
+from crossbody.hw.fitting.agreement import agreement
+from crossbody.hw.fitting.covariance import Layout, noise_correlation, scatter
+
+LAYOUTS = (
+    Layout(samples=(40,), k=1), Layout(samples=(25, 31), k=2), Layout(samples=(30,) * 5, k=1),
+    Layout(samples=(24,) * 6, k=2, overlap=1),
+)  # fmt: skip
+
+
+def drawn(seed: int, layout: Layout, correlation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """An orthonormal basis (N, 3), weights of estimates (N, 3) and residuals (N,) that the fit has left."""
+    random, count = np.random.default_rng(seed), layout.k * sum(layout.samples)
+    J = np.column_stack([np.cumsum(random.normal(size=count)) for _ in range(3)])
+    Q = np.linalg.qr(J)[0]
+    noise = np.linalg.cholesky(correlated(layout, correlation)) @ random.normal(size=count)
+    return Q, np.linalg.pinv(J).T, noise - Q @ (Q.T @ noise)
+
+
+def lengths(layout: Layout) -> list[int]:
+    """Of every channel of every window, as residuals follow each other."""
+    return [m for m in layout.samples for _ in range(layout.k)]
+
+
+def correlated(layout: Layout, rho: float) -> np.ndarray:
+    """V_ij = rho^|i - j| within each channel of each window (N, N)."""
+    return block_diag(*(toeplitz(rho ** np.arange(m)) for m in lengths(layout)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_the_correlation_of_the_noise_is_the_one_that_leaves_what_is_seen(layout: Layout, seed: int) -> None:
+    Q, _, residual = drawn(seed, layout, 0.6)
+    rho = noise_correlation(Q, residual, layout)
+    next_ = block_diag(*(0.5 * (np.eye(m, k=1) + np.eye(m, k=-1)) for m in lengths(layout)))
+    left = np.eye(len(residual)) - Q @ Q.T
+    meant = left @ correlated(layout, rho) @ left
+    seen = residual @ next_ @ residual / (residual @ residual)
+    assert np.trace(next_ @ meant) / np.trace(meant) == pytest.approx(seen, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_estimates_scatter_together_as_the_noise_goes_through_their_weights(layout: Layout, seed: int) -> None:
+    """Their correlations are those of L^T V L; overlapping windows are never taken for white."""
+    for correlation in (0.0, 0.7):
+        Q, L, residual = drawn(seed, layout, correlation)
+        found = scatter(Q, L, residual, layout)
+        if layout.overlap:
+            assert "overlap" in found.how
+        if found.how == "white residuals":
+            channel = np.concatenate([np.repeat(np.arange(layout.k), m) for m in layout.samples])
+            free = 1.0 - (Q * Q).sum(axis=1)
+            own = [channel == c for c in range(layout.k)]
+            sizes = [residual[rows] @ residual[rows] / free[rows].sum() for rows in own]
+            whole = L.T @ (np.array(sizes)[channel][:, None] * L)
+            np.testing.assert_allclose(found.covariance, whole, rtol=1e-9)
+            assert found.std == pytest.approx(np.sqrt(np.diag(whole)), rel=1e-9)
+            continue
+        whole = L.T @ correlated(layout, found.correlation) @ L
+        size = np.sqrt(np.diag(whole))
+        np.testing.assert_allclose(
+            found.covariance / np.outer(found.std, found.std), whole / np.outer(size, size), rtol=1e-6
+        )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_halves_are_compared_in_what_both_of_them_tell(seed: int) -> None:
+    """Not in what one of them does not see, or sees of two together alone."""
+    random, layout, names = np.random.default_rng(seed), Layout(samples=(40,) * 10, k=1), tuple("abcde")
+    J = random.normal(size=(400, 5))
+    late = layout.windows() >= 5
+    place = random.permutation(5)
+    unseen, one, other = place[:3]
+    J[late, unseen] = 0.0
+    J[~late, other] = J[~late, one]
+    residual = random.normal(size=400)
+    residual -= J @ np.linalg.lstsq(J, residual, rcond=None)[0]
+    found = agreement(J, residual, layout, np.zeros(5), np.ones(5), names, ())
+    assert [half.name for half in found] == [names[i] for i in sorted(place[3:])]
+    for half in found:
+        i = names.index(half.name)
+        for rows, value, std in zip((~late, late), half.values, half.stds, strict=True):
+            weights = np.linalg.pinv(J[rows])
+            assert value == pytest.approx((weights @ residual[rows])[i], abs=1e-9)
+            assert std == pytest.approx(np.linalg.norm(weights[i]), rel=0.5)  # of noise of size 1
