@@ -12,6 +12,7 @@ from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats, Index
 
 STEP = 1e-30
+SLOW = 1e-9
 NO_ROWS: Index = np.zeros(0, dtype=np.int64)
 
 
@@ -28,6 +29,9 @@ class Point:
         alpha (nc, 3), friction (nc,), drift (nc,): in force in place of the system's own.
         sliding: contacts that slide, by their normal rows, and rows that do so against dry friction of their own.
         way (nc,): by tangential row, the direction in which one slides whatever its velocity; NaN where that says it.
+        emerging: contacts that slide in space at hardly any speed, in the direction of their acceleration.
+        spins (k,): rates at which the directions of what emerges turn, rad/s; 0 if not given.
+        slow: part of its terms below which a slip velocity has no direction.
         idle: rows that follow from the other active ones, which hold them.
         sharing: these and those that they follow from, but for rows that nothing moves.
         held: places in `active` of the idle rows.
@@ -46,7 +50,10 @@ class Point:
     friction: Array | None = None
     drift: Array | None = None
     sliding: Index = field(default_factory=lambda: NO_ROWS)
-    way: Floats | None = None
+    way: Array | None = None
+    emerging: Index = field(default_factory=lambda: NO_ROWS)
+    spins: Floats | None = None
+    slow: float = SLOW
     idle: Index = field(default_factory=lambda: NO_ROWS)
     sharing: Index = field(default_factory=lambda: NO_ROWS)
     held: Index = field(init=False)

@@ -11,7 +11,7 @@ from crossbody.reference.kinds import Array, Floats, Index
 from crossbody.reference.linear._point import Point, dense, terms
 
 DEPENDENT = 1e-5  # part of a row, of size 1, that does not follow from others, below which it does
-SLOW = 1e-9  # part of its terms below which a slip velocity has no direction, and a row nothing that it moves
+STILL = 1e-9  # part of the largest row below which a row has nothing that it moves
 CLEAR = 1e-9  # part of its bound by which the force of a contact that sticks must stay below it
 HELD = 1e-8  # part of its terms by which the law of a row may be off that others hold
 JAMMED = 1e-9  # determinant, of rows of size 1, that counts as none
@@ -25,7 +25,8 @@ def borne(at: Point, H: Array, v: Array, lam: Array) -> Array:
     """Multipliers of all active rows (na, ...) from those of the rows that are solved for."""
     if len(at.solved) == len(at.active):
         return lam
-    found = np.zeros((len(at.active), *lam.shape[1:]), np.result_type(H, v, lam, at.given("friction")))
+    kinds = (H, v, lam, at.given("friction"), *(() if at.way is None else (at.way,)))
+    found = np.zeros((len(at.active), *lam.shape[1:]), np.result_type(*kinds))
     found[at.solved] = lam
     for i, normal, places in at.slid:
         bound = at.given("friction")[i] * (1.0 if normal < 0 else found[normal])
@@ -34,7 +35,7 @@ def borne(at: Point, H: Array, v: Array, lam: Array) -> Array:
     return found
 
 
-def given_way(at: Point, rows: Index) -> Floats | None:
+def given_way(at: Point, rows: Index) -> Array | None:
     """The direction in which these tangential rows slide, if it is given."""
     if at.way is None or np.isnan(at.way[rows]).any():
         return None
@@ -75,7 +76,7 @@ def independent(at: Point) -> Point:
     root = np.linalg.cholesky(dense(blocks))
     rows = np.linalg.solve(root, H.T).T  # rows of size 1 in the metric of M^-1
     size = np.linalg.norm(rows, axis=1)
-    dead = size <= SLOW * size.max(initial=0.0)
+    dead = size <= STILL * size.max(initial=0.0)
     rows = rows / np.where(dead, 1.0, size)[:, None]
     for place in [*np.flatnonzero(~np.array(last, dtype=bool)), *np.flatnonzero(last)]:
         if place not in at.solved:
@@ -88,7 +89,7 @@ def independent(at: Point) -> Point:
             kept.append(place)
             continue
         idle.append(int(at.active[place]))
-        among = [int(at.active[k]) for k, c in zip([*kept, place], [*part, 1.0], strict=True) if abs(c) > SLOW]
+        among = [int(at.active[k]) for k, c in zip([*kept, place], [*part, 1.0], strict=True) if abs(c) > STILL]
         sharing.update(among)
         if set(among) & set(at.sliding.tolist()):
             raise SceneError(
@@ -119,7 +120,7 @@ def check_slips(at: Point, H: Floats) -> None:
             continue
         drift = at.given("drift")[rows]
         slip, size = H[places] @ at.v - drift, np.abs(H[places]) @ np.abs(at.v) + np.abs(drift)
-        if not np.linalg.norm(slip) > SLOW * size.max():
+        if not np.linalg.norm(slip) > at.slow * size.max():
             raise NoDirectionError(
                 f"linearise: row {i} slides at no speed at q = {at.q.tolist()}, so that its friction has no direction; "
                 "valid: a state in which it slides, or the contact among those that stick."

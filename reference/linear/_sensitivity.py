@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 from scipy.integrate import solve_ivp
-from scipy.linalg import block_diag
 
 from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
-from crossbody.reference.linear._point import NO_ROWS, Point, directions, rubbing, turning
+from crossbody.reference.linear._emerging import settled
+from crossbody.reference.linear._point import NO_ROWS, Point, directions, turning
 from crossbody.reference.linear._rubbing import NoDirectionError
-from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, Slipping
+from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, NOISE, STILL, Slipping
 from crossbody.reference.linear._slipping import AS_ONE as SWITCH_AS_ONE
 from crossbody.reference.linear._variation import (
     Theta,
@@ -31,7 +32,7 @@ from crossbody.reference.linear._variation import (
     lam_gradient,
     rate_slopes,
     rates,
-    slips,
+    slip_speeds,
     theta,
 )
 from crossbody.reference.linear.linearisation import point
@@ -149,7 +150,7 @@ def sensitivity(
 def _placed(here: Point, t: float, y: Floats) -> Point:
     """The point at a time and a state."""
     nq = here.system.nq
-    return replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + here.system.n].copy())
+    return settled(replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + here.system.n].copy()))
 
 
 def _same(end: Floats, motion: Floats) -> bool:
@@ -168,15 +169,17 @@ class _Walk:
         self.modes = initial_modes(system, at.q, at.v).astype(int).tolist()
         self.jumps: list[Jump] = []
         self.message = ""
-        states = [(q.copy(), v.copy(), i) for q, v in zip(run.q, run.v, strict=True) for i in rubbing(system).values()]
-        speed = max((float(np.linalg.norm(slips(at, *state))) for state in states), default=0.0)
-        self.slipping = Slipping(system=system, over=over, run=run, place=_placed, speed=speed or 1.0)
+        slipped, still = slip_speeds(at, run), max(STILL, NOISE * rtol)
+        self.slipping = Slipping(
+            system=system, over=over, run=run, place=_placed, slipped=slipped, still=still,
+            speed=float(slipped.max(initial=0.0)) or 1.0,
+        )  # fmt: skip
 
     def along(self, run: Trajectory, t_end: float) -> Outcome:
         """Go to the end; FINISHED, or how the derivative was lost."""
         now, rubs = 0.0, self.at.system.frictional
         if rubs and not (run.events and run.events[0].t == 0.0):
-            self.slipping.hold(self._here(0.0), self.S)
+            self.x[self.at.system.nq :] = self.slipping.hold(self._here(0.0), self.S)
         for t, group in groupby(run.events, key=lambda event: event.t):
             if not self._smooth(now, t):
                 return Outcome.ILL_POSED
@@ -196,7 +199,7 @@ class _Walk:
         fast = (np.array(modes) == Mode.COLLISION) & (np.asarray(system.b0) > 0.0)
         at = replace(
             self.at, q=self.x[:nq].copy(), v=self.x[nq:].copy(), t=t,
-            alpha=np.where(fast[:, None], system.beta, system.alpha), idle=NO_ROWS, sharing=NO_ROWS,
+            alpha=np.where(fast[:, None], system.beta, system.alpha), idle=NO_ROWS, sharing=NO_ROWS, emerging=NO_ROWS,
             active=np.array([i for i, mode in enumerate(modes) if mode in ACTIVE], dtype=np.int64),
         )  # fmt: skip
         return self.slipping.directed(at, modes, self._sample(t, side)) if system.frictional else at
@@ -260,16 +263,17 @@ class _Walk:
 
         return rate
 
-    def _jacobian(self, here: Point) -> Callable[[float, Floats], Floats]:
+    def _jacobian(self, here: Point) -> Callable[[float, Floats], sparse.csc_array]:
         """Of the right-hand side, but for second derivatives: Newton's method finds its way without."""
         system, n, nq = self.at.system, self.at.system.n, self.at.system.nq
 
-        def jacobian(t: float, y: Floats) -> Floats:
+        def jacobian(t: float, y: Floats) -> sparse.csc_array:
             moved = _placed(here, t, y)
             vd_x, N = flow(moved, self.over)[1][:, : 2 * n], directions(system, moved.q)
             whole = np.block([[turning(system, t, moved.q, moved.v), np.eye(n)], [vd_x]])
             own = np.block([[np.zeros((nq, nq)), N], [vd_x[:, :n] @ np.linalg.pinv(N), vd_x[:, n:]]])
-            return np.asarray(block_diag(own, np.kron(whole, np.eye(self.S.shape[1]))), dtype=np.float64)
+            spread = sparse.kron(whole, sparse.eye_array(self.S.shape[1]))
+            return sparse.csc_array(sparse.block_diag([sparse.csc_array(own), spread]))
 
         return jacobian
 
@@ -295,7 +299,7 @@ class _Walk:
                 raise SceneError(SWITCH_AS_ONE.format(t=t))
             if known:
                 self._jump(group, changes[0], R, old, new)
-        self.slipping.hold(after, self.S)
+        self.x[self.at.system.nq :] = self.slipping.hold(after, self.S)
         return True
 
     def _shift(self, g: Floats, old: Floats) -> Floats | None:

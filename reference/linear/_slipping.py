@@ -17,6 +17,7 @@ from crossbody.cases import Event, Mode, SceneError, Trajectory
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._derivatives import saddle
+from crossbody.reference.linear._emerging import emerges, emerging
 from crossbody.reference.linear._point import Point, gaps
 from crossbody.reference.linear._rubbing import given_way, independent
 from crossbody.reference.linear._variation import (
@@ -32,6 +33,10 @@ from crossbody.reference.linear._variation import (
 
 ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
 STILL = 1e-7  # part of the largest slip, below which one in space has the direction that it had last, or has next
+NOISE = 1e2  # times the tolerance, where this is more: a slower slip has no direction that is known
+SHORT = 1e-2  # part of the largest slip from its start to its end, where this is less: direction turns in that time
+FLEETING = 1e-11  # part of the largest slip in a motion below which one that is larger nowhere has no direction
+ROUNDED = 1e-14  # part of its terms to which a slip velocity is rounded off, many times over
 FAST = 1e-2  # part of the largest slip, below which one that grows in space turns too fast for an explicit method
 NONE = 1e-6  # part of its size below which what is looked at at an event counts as what fell to zero
 GRAZED = 1e-8  # part of the largest slip, or of a bound, to which a contact may come without an event
@@ -44,6 +49,10 @@ AS_ONE = (
 TURNS_BACK = (
     "sensitivity: the slip of row {i} turns back through zero at t = {t:.9g} s; beside this motion it turns round in "
     "space instead, so that there is no derivative."
+)
+TOO_SHORT = (
+    "sensitivity: row {i} slides at t = {t:.9g} s for so short a time that the direction of its slip, and how it "
+    "changes with the motion, is lost in rounding."
 )
 SHARED = (
     "sensitivity: row {i} slides at t = {t:.9g} s out of a load that it shared, and the law does not say how a "
@@ -58,14 +67,17 @@ class Slipping:
 
     Attributes:
         system: the mechanism. over: parameters. run: the motion. place: a point moved to a time and a state.
-        speed: largest slip in the motion.
+        slipped: speed at which every contact slips (samples, nc). speed: the largest, 1 if there is none.
+        still: part of it below which a slip in space is given its direction.
     """
 
     system: System
     over: Theta
     run: Trajectory
     place: Place
+    slipped: Floats
     speed: float
+    still: float
 
     def directed(self, at: Point, modes: Sequence[int], k: int) -> Point:
         """The point with what slides there: in a plane, or without speed, in the direction that sample k has."""
@@ -74,11 +86,27 @@ class Slipping:
         for i in sliding:
             rows, slip = self._rows(i), slips(at, at.q, at.v, i)
             size = float(np.linalg.norm(slip))
-            if len(rows) == 1 or size <= 0.5 * STILL * self.speed:
+            if len(rows) == 1 or size <= 0.5 * self.band(i, k):
                 way[rows] = self._way(i, k)
-            elif size <= 1.5 * STILL * self.speed:
+            elif size <= 1.5 * self.band(i, k):
                 way[rows] = slip / size
-        return independent(replace(at, sliding=np.array(sliding, dtype=np.int64), way=way))
+        at = independent(replace(at, sliding=np.array(sliding, dtype=np.int64), way=way, slow=ROUNDED))
+        still = [i for i in sliding if self.system.tangents[i] > 1 and not np.isnan(way[self._rows(i)]).any()]
+        slow = [i for i in still if np.linalg.norm(slips(at, at.q, at.v, i)) <= 0.5 * self.band(i, k)]
+        return emerging(at, [i for i in slow if emerges(at, i)])
+
+    def band(self, i: int, k: int) -> float:
+        """Slip of contact i, in space, below which it is given its direction while it slides at sample k.
+
+        Raises:
+            SceneError: if it slides for too short a time for its slip to have a direction at all.
+        """
+        off = np.flatnonzero(self.run.mode[:, i] != Mode.SLIP)
+        first, last = np.append(off[off < k], -1).max() + 1, np.append(off[off > k], len(self.slipped)).min()
+        peak = float(self.slipped[first:last, i].max(initial=0.0))
+        if peak < FLEETING * self.speed:
+            raise SceneError(TOO_SHORT.format(i=i, t=float(self.run.t[k])))
+        return min(self.still * self.speed, SHORT * peak)
 
     def _rows(self, i: int) -> Any:
         return int(self.system.tangent[i]) + np.arange(int(self.system.tangents[i]))
@@ -101,13 +129,14 @@ class Slipping:
         ends, stiff = list[Any](), False
         for i in [i for i in here.sliding.tolist() if self.system.tangents[i] > 1]:
             f, slip = rates(here), slips(here, here.q, here.v, i)
-            held = given_way(here, self._rows(i)) is not None
-            limits = [(2.0 * STILL, 1.0) if held else (STILL, -1.0)]
+            size, fast = float(np.linalg.norm(slip)), FAST * self.speed
+            band = self.band(i, int(np.searchsorted(self.run.t, here.t, "right")) - 1)
+            limits = [(band, -1.0) if given_way(here, self._rows(i)) is None else (2.0 * band, 1.0)]
             grows = float(slip @ (slip_gradient(here, self.over, i)[:, : len(f)] @ f)) >= 0.0
-            if np.linalg.norm(slip) < FAST * self.speed and (grows or np.linalg.norm(slip) < 0.1 * STILL * self.speed):
+            if size < fast and (grows or size < 0.1 * band):
                 stiff = True
-                limits.append((FAST, 1.0))
-            ends += [self._crossing(here, i, limit * self.speed, way) for limit, way in limits]
+                limits.append((fast, 1.0))
+            ends += [self._crossing(here, i, limit, way) for limit, way in limits]
         return ends, stiff
 
     def _crossing(self, here: Point, i: int, limit: float, way: float) -> Any:
@@ -168,6 +197,7 @@ class Slipping:
             if self._shares(here, i):
                 raise SceneError(SHARED.format(i=i, t=e.t))
             value, gradient, size = cone_gradient(here, self.over, i)
+            size = max(size, 0.0 if self.system.dry[i] else float(self.system.friction[i]) * self._load())
         elif e.before is Mode.SLIP and e.after in (Mode.STICK, Mode.SLIP):
             slip, size = slips(here, here.q, here.v, i), self.speed
             value, gradient = float(np.linalg.norm(slip)), self._way(i, k) @ slip_gradient(here, self.over, i)
@@ -175,7 +205,7 @@ class Slipping:
                 raise SceneError(TURNS_BACK.format(i=i, t=e.t))
         elif e.before in ACTIVE:
             lam = slopes(here, self.over)[1]
-            value, size = lam[here.active.tolist().index(i)], float(np.abs(self.run.lam).max())
+            value, size = lam[here.active.tolist().index(i)], self._load()
             gradient = lam_gradient(here, self.over, i)
         else:
             rate = e.before is not Mode.FREE
@@ -186,18 +216,28 @@ class Slipping:
             )
         return gradient if abs(value) <= NONE * abs(size) else None
 
-    def hold(self, here: Point, S: Floats) -> None:
-        """Let deviations S (2 n, ...) by which contacts that stick would slip die out, in place."""
-        n, K = self.system.n, None
+    def _load(self) -> float:
+        """Largest multiplier of the motion."""
+        return float(np.abs(self.run.lam).max())
+
+    def hold(self, here: Point, S: Floats) -> Floats:
+        """Let deviations S (2 n, ...) by which contacts that stick would slip die out, in place; the velocity (n,).
+
+        So does what is left of the velocity of a slip that has stopped: another one is to begin from none.
+        """
+        n, K, v = self.system.n, None, here.v.copy()
         for i in np.flatnonzero(np.asarray(self.system.tangents)).tolist():
             if i in here.sliding or not len(here.tangents(i)):
                 continue
             K = saddle(here)[0] if K is None else K
-            gradient = slip_gradient(here, self.over, i)
-            for place, row in zip(here.tangents(i), gradient, strict=True):
+            gradient, slip = slip_gradient(here, self.over, i), slips(here, here.q, v, i)
+            left = slip if np.linalg.norm(slip) <= self.still * self.speed else np.zeros(len(slip))
+            for place, row, part in zip(here.tangents(i), gradient, left, strict=True):
                 unit = np.zeros(len(K))
                 if place in here.solved:
                     unit[n + here.solved.tolist().index(place)] = 1.0
-                    change = row[: 2 * n] @ S
+                    change, way = row[: 2 * n] @ S, np.linalg.solve(K, unit)[:n]
                     change[2 * n :] += row[2 * n :]
-                    S[n:] -= np.outer(np.linalg.solve(K, unit)[:n], change)
+                    S[n:] -= np.outer(way, change)
+                    v -= way * part
+        return v

@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import UnknownName
+from crossbody.cases import Trajectory, UnknownName
 from crossbody.cases.closed_forms import damping_ratio, restitution
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._derivatives import implied, residual, saddle
+from crossbody.reference.linear._emerging import accelerations_by_turns, by_turns, slip_accelerations, with_turns
 from crossbody.reference.linear._point import STEP, Point, dense, directions, gaps, rubbing, terms
 from crossbody.reference.linear._rubbing import borne, loads
 
@@ -95,8 +96,15 @@ def flow(at: Point, over: Theta) -> tuple[Floats, Floats]:
     """
     K, vd, lam = saddle(at)
     columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
-    solved = np.asarray(np.linalg.solve(K, columns[: len(K)]), dtype=np.float64)
-    return np.concatenate([at.v, vd]), -solved[: at.system.n]
+    solved = -np.asarray(np.linalg.solve(K, columns[: len(K)]), dtype=np.float64)[: at.system.n]
+    return np.concatenate([at.v, vd]), _turning(at, over, vd, solved, accelerations_by_turns(at))
+
+
+def _turning(at: Point, over: Theta, vd: Floats, found: Floats, turn: Floats) -> Floats:
+    """Derivatives of (v', ...) with the directions of slips that emerge turning, by `with_turns`."""
+    if not len(at.emerging):
+        return found
+    return with_turns(at, vd, found, turn, gradient(lambda here, q, v: slip_accelerations(here, q, v, vd), at, over))
 
 
 def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
@@ -109,7 +117,10 @@ def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
     columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
     bearing = gradient(lambda here, q, v: loads(here, q, v, at.u, lam), at, over)
     every = borne(at, terms(at, at.q, at.v, at.u)[2], at.v, lam)
-    return np.concatenate([at.v, vd]), every, np.vstack(implied(at, K, columns, bearing))
+    found = np.vstack(implied(at, K, columns, bearing))
+    columns = by_turns(lambda here: residual(here, at.q, at.v, at.u, vd, lam), at)
+    turn = np.vstack(implied(at, K, columns, by_turns(lambda here: loads(here, at.q, at.v, at.u, lam), at)))
+    return np.concatenate([at.v, vd]), every, _turning(at, over, vd, found, turn)
 
 
 def rate_slopes(at: Point, over: Theta) -> Floats:
@@ -134,6 +145,15 @@ def slips(at: Point, q: Array, v: Array, i: int) -> Array:
     """Slip velocity (1,) or (2,) of contact i."""
     rows = int(at.system.tangent[i]) + np.arange(int(at.system.tangents[i]))
     found: Array = gaps(at, q, v)[at.system.nc + rows] - at.given("drift")[rows]
+    return found
+
+
+def slip_speeds(at: Point, run: Trajectory) -> Floats:
+    """Speed at which every contact slips at every sample of a motion (samples, nc); 0 of what is no contact."""
+    found = np.zeros(run.mode.shape)
+    for k, (q, v) in enumerate(zip(run.q, run.v, strict=True)):
+        for i in set(rubbing(at.system).values()):
+            found[k, i] = np.linalg.norm(slips(at, q.copy(), v.copy(), i))
     return found
 
 

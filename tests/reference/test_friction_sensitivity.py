@@ -11,7 +11,7 @@ from friction_scenes import G, point, rod_on_floor, rubbed_tree, tossed
 from crossbody.cases import Mode, Outcome, SceneError, UnknownName
 from crossbody.cases.files.case import case_of
 from crossbody.reference import kernels, simulate
-from crossbody.reference.linear import sensitivity
+from crossbody.reference.linear import _slipping, sensitivity
 from crossbody.reference.linear.differences import differences
 from crossbody.reference.tree.system import system
 
@@ -104,18 +104,18 @@ def test_a_cycle_of_stick_and_slip_keeps_its_phase_alone():
     np.testing.assert_allclose(found.by_start @ flow, flow, atol=1e-7 * np.abs(flow).max())
 
 
-def ends(made, q, v, t_end):
-    run = simulate(made, q, v, t_end, rtol=1e-12)
+def ends(made, q, v, t_end, rtol=1e-12):
+    run = simulate(made, q, v, t_end, rtol=rtol)
     assert run.outcome is Outcome.FINISHED
     return run.q[-1], run.v[-1]
 
 
-def compared(made, q, v, t_end, *, ways=3, step=1e-5, seed=0, close=1e-6):
+def compared(made, q, v, t_end, *, ways=3, step=1e-5, seed=0, close=1e-6, rtol=1e-9, runs=1e-12):
     """Derivatives along drawn directions of the start, and by mu, with central differences of runs."""
     n = made.n
     contacts = [i for i in np.flatnonzero(made.tangents) if not made.dry[i]]
     names = [f"mu[{i}]" for i in contacts]
-    found = sensitivity(made, q, v, t_end, parameters=names, rtol=1e-9)
+    found = sensitivity(made, q, v, t_end, parameters=names, rtol=rtol)
     if found.outcome is not Outcome.FINISHED:
         return found
     N = np.stack([made.displacement(found.state[: made.nq], e) for e in np.eye(n)], axis=-1)
@@ -129,11 +129,11 @@ def compared(made, q, v, t_end, *, ways=3, step=1e-5, seed=0, close=1e-6):
 
     for _ in range(ways):
         d = rng.normal(size=2 * n)
-        expected = tangent(lambda s, d=d: ends(made, q + here @ d[:n] * s, v + d[n:] * s, t_end))
+        expected = tangent(lambda s, d=d: ends(made, q + here @ d[:n] * s, v + d[n:] * s, t_end, runs))
         assert np.abs(found.by_start @ d - expected).max() < close * max(np.abs(expected).max(), 1.0)
     if names:
         expected = tangent(
-            lambda s: ends(replace(made, mu=np.where(np.isfinite(made.mu), made.mu + s, made.mu)), q, v, t_end)
+            lambda s: ends(replace(made, mu=np.where(np.isfinite(made.mu), made.mu + s, made.mu)), q, v, t_end, runs)
         )
         total = found.by_parameters.sum(axis=1)
         assert np.abs(total - expected).max() < close * max(np.abs(expected).max(), 1.0)
@@ -155,13 +155,30 @@ def test_oblique_slide_in_space():
     np.testing.assert_allclose(found.by_start[:2, 3:5], differences(lambda v: where(v)[:2], v[:2], 1e-4), atol=1e-8)
 
 
-@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 4, 6))])
+@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 4, 5, 6, 7))])
 def test_tossed_bodies(seed):
     """Touches with friction, slips that turn, stops, slides out of sticking and releases, in space."""
     scene, q, v, _ = tossed(seed, most=1)
     made = system(scene, case_of(scene).law)
-    found = compared(made, q, v, 0.3, seed=seed)
+    found = compared(made, q, v, 0.3, seed=seed, rtol=1e-10, step=3e-4, runs=1e-13)
     assert ("FREE", "SLIP") in kinds(found)
+
+
+def test_a_slide_out_of_sticking_that_lifts_at_once():
+    """It lasts 71 us: the direction of its slip turns while the slip still has none that its velocity tells."""
+    scene, q, v, _ = tossed(0, most=1)
+    made = system(scene, case_of(scene).law)
+    found = compared(made, q, v, 0.19, step=1e-4, close=1e-7, runs=1e-13)
+    assert kinds(found)[-2:] == [("STICK", "SLIP"), ("SLIP", "BALLISTIC")]
+
+
+def test_a_slide_of_no_length_is_refused(monkeypatch):
+    """As if rounding were of the size of the slips themselves."""
+    scene, q, v, _ = tossed(0, most=1)
+    made = system(scene, case_of(scene).law)
+    monkeypatch.setattr(_slipping, "FLEETING", 1e-3)
+    with pytest.raises(SceneError, match=r"row 0 slides at t = 0\.184\d* s for so short a time"):
+        sensitivity(made, q, v, 0.19, rtol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))
