@@ -23,8 +23,8 @@ LADDER = (1.0, 10.0, 100.0, 1000.0)
 BOUNDED = 2
 """The first so many of them are left for the next where they take too many steps."""
 SHORTER = 0.1
-"""Each is left for the next, too, where a run that its budget ends gets less far than this part of the coarse one: where
-stiff contacts slide steps are of low order, and a hundred times as many for four digits more."""
+"""Each is left for the next, too, where a run that its budget ends gets less far than this part of the coarse one:
+where stiff contacts slide steps are of low order, and a hundred times as many for four digits more."""
 FEW, FEWEST, MORE, AMPLE = 4, 200, 2, 1.5
 """Steps that tell what one of an engine costs; how many a run takes at least, with those that choose its method; by how
 much more are tried next; and how much more than may be paid for before a run counts as too dear."""
