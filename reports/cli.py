@@ -92,7 +92,7 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 )  # fmt: skip
 @click.option(
     "--budget", type=options.ABOVE_0, default=5.0, show_default=True, metavar="S",
-    help="Processor time of the tightest run of a scene: motions are compared as far as it gets. Engines have 12 times it.",
+    help="Processor time of a tight run of a scene: motions are compared as far as it gets. Engines have 12 times it.",
 )  # fmt: skip
 @options.engine_limit
 @options.against
