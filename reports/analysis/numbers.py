@@ -1,4 +1,4 @@
-"""What an analysis shows of equilibria: trim, poles, ranks, responses, and a map of the workspace (spec 2.7)."""
+"""What an analysis shows of equilibria: trim, poles, ranks, responses, and a map of the workspace."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases.arrays import Floats
 from crossbody.reference import delta
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.loop import characteristic
@@ -20,6 +21,8 @@ POLES = ("place", "real", "imag", "frequency", "damping", "led_by")
 RANKS = ("place", "states", "controllable", "observable", "growth")
 REFUSALS = ("place", "why")
 COEFFICIENTS = ("place", "axis", "s^2", "s", "1", "coupling")
+ALIKE = 1e-6
+"""Part of the largest participation by which others are as large: places and speeds take part alike in what swings."""
 RESPONSES = ("place", "input", "output", "omega", "magnitude", "phase")
 
 
@@ -38,7 +41,7 @@ def equilibria(found: Sequence[Place], case: Case) -> pd.DataFrame:
 
 
 def poles(found: Sequence[Place]) -> pd.DataFrame:
-    """One row a pole; `led_by` is the state that takes part in it most."""
+    """One row a pole; `led_by` is the state that takes part in it most, of such that do so alike the first."""
     rows = []
     for place in found:
         if place.model is None:
@@ -47,9 +50,13 @@ def poles(found: Sequence[Place]) -> pd.DataFrame:
         for k, pole in enumerate(m.poles.tolist()):
             rows.append(
                 {"place": place.name, "real": pole.real, "imag": pole.imag, "frequency": float(m.frequency[k]),
-                 "damping": float(m.damping[k]), "led_by": m.states[int(m.participation[:, k].argmax())]}
+                 "damping": float(m.damping[k]), "led_by": m.states[_leader(m.participation[:, k])]}
             )  # fmt: skip
     return pd.DataFrame(rows, columns=list(POLES))
+
+
+def _leader(participation: Floats) -> int:
+    return int(np.argmax(participation >= (1.0 - ALIKE) * participation.max()))
 
 
 def ranks(found: Sequence[Place]) -> pd.DataFrame:
