@@ -29,7 +29,7 @@ Value = float | int | str | bool
 
 
 class Tier(StrEnum):
-    """How a truth is known (spec 5.2)."""
+    """How a truth is known (docs/explanation/verdicts.md)."""
 
     A = "A closed form"
     B = "B published digits"
@@ -109,13 +109,13 @@ class Coordinate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Law:
-    """Constants of h'' + a1 h' + a0 h + a2 h^3 = 0, one row a constraint (spec 1.1).
+    """Constants of h'' + a1 h' + a0 h + a2 h^3 = 0, one row a constraint (docs/explanation/model.md).
 
     Attributes:
         a0 (nc,): 1/s^2.
         a1 (nc,): 1/s.
         a2 (nc,): 1/(m^2 s^2).
-        b0, b1 (nc,): fast constants of COLLISION in the units of a0, a1; zero where a row has one set (spec 1.1).
+        b0, b1 (nc,): fast constants of COLLISION in the units of a0, a1; zero where a row has one set.
         unilateral (nc,): False for a constraint that is always on.
     """
 

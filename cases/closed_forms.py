@@ -1,4 +1,4 @@
-"""What one contact does under h'' + a1 h' + a0 h (+ a2 h^3) = 0, in closed form (spec 1.3, 1.4).
+"""What one contact does under h'' + a1 h' + a0 h (+ a2 h^3) = 0, in closed form (docs/explanation/model.md).
 
 w = sqrt(a0), zeta = a1 / (2 w), v0 > 0 the speed of approach. The contact ends when lam = 0, not when h = 0: the
 textbook restitution exp(-pi zeta / sqrt(1 - zeta^2)) belongs to a contact that pulls.
@@ -82,7 +82,7 @@ def elastic_separation_gap(a0: float, a2: float, gravity: float) -> float:
 def contact_work(
     mass: float, gravity: float, a0: float, a1: float, a2: float, h_in: float, h_out: float, speed2: float
 ) -> float:
-    """Energy that one contact gives the body (negative: takes), J (spec 1.4).
+    """Energy that one contact gives the body (negative: takes), J (docs/explanation/model.md).
 
     dE = -m a1 INT h'^2 dt + m [g (h_out - h_in) - a0 (h_out^2 - h_in^2)/2 - a2 (h_out^4 - h_in^4)/4]
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Mode(IntEnum):
-    """State of one constraint row (spec 1.2)."""
+    """State of one constraint row (docs/explanation/model.md)."""
 
     FREE = 0
     CONTACT = 1
@@ -45,7 +45,7 @@ class Event:
         contact: index of the constraint row.
         before: mode before.
         after: mode after.
-        impulse: impulse of a frozen collision (spec 1.2) at its end, N s; 0 where lam is finite.
+        impulse: impulse of a frozen collision (docs/explanation/model.md) at its end, N s; 0 where lam is finite.
     """
 
     t: float
@@ -75,7 +75,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ledger:
-    """The energy account of spec 1.4: E(t) - E(0) = input - dissipated + sum of contact work + residual.
+    """The energy account: E(t) - E(0) = input - dissipated + sum of contact work + residual.
 
     Attributes:
         contact (n, nc): work done by each row's multiplier since the start, J.

@@ -1,4 +1,4 @@
-"""The level machine (spec 1.2), in plain Python: independent of the compiled core.
+"""The level machine (docs/explanation/model.md), in plain Python: independent of the compiled core.
 
     FREE -> active        h <= 0 and (h' < 0 or h < 0); at rest on the surface if it would press
     active -> BALLISTIC   lam < 0 and h <= 0            active -> FREE        lam < 0 and h > 0

@@ -1,4 +1,4 @@
-"""Cases whose collisions take no time, as engines have them that integrate every contact (spec 2.2)."""
+"""Cases whose collisions take no time, as engines have them that integrate every contact."""
 
 from __future__ import annotations
 

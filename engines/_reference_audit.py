@@ -1,4 +1,4 @@
-"""The physics as the reference's kernels return it, for the parity audit (spec 5.3)."""
+"""The physics as the reference's kernels return it, for the parity audit (docs/explanation/verdicts.md)."""
 
 from __future__ import annotations
 

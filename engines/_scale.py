@@ -12,7 +12,7 @@ from crossbody.cases.arrays import Floats
 
 
 def resolving_step(law: Law, depth: float = 0.0, steps: int = 20) -> float:
-    """A time step with that many steps in half a period of the fastest row, s (spec 4.2). inf without a law.
+    """A time step with that many steps in half a period of the fastest row, s. inf without a law.
 
     Args:
         law: constants of every row; the fast ones count too.

@@ -16,7 +16,7 @@ from crossbody.reference.start import check_start
 
 
 def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **options: Unpack[Chosen]) -> Trajectory:
-    """Integrate the hybrid penalty DAE of spec 1.1 from (q0, v0) at t = 0 to t_end.
+    """Integrate the hybrid penalty DAE (docs/explanation/model.md) from (q0, v0) at t = 0 to t_end.
 
     Args:
         system: the mechanism.

@@ -42,7 +42,7 @@ class System:
         quaternions: index in q of the first of the four entries, w first, of every quaternion. Its length is 1 in all
             that is handed over; inside a step it may differ by the tolerance, which kernels must bear.
         parameters: p of the kernels: an array, or names with values in the kernels' order.
-        a0, a1, a2 (nc,): slow constants of every row; a number serves all rows (spec 1.1).
+        a0, a1, a2 (nc,): slow constants of every row; a number serves all rows (docs/explanation/model.md).
         b0, b1, b2 (nc,): fast constants of COLLISION; b0 = 0 where a row has one set only.
         unilateral (nc,): False for a row that is always on.
         redundant: indices of rows that are always on but follow from the others: they are held by these and stay off,

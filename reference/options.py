@@ -55,9 +55,9 @@ class Options:
         t_end: horizon, s.
         rtol: relative tolerance in [1e-14, 0.1].
         atol: absolute tolerance; rtol/1000 if not given.
-        fsm: "level", "edge" or "memoryless" (spec 1.2).
+        fsm: "level", "edge" or "memoryless" (docs/explanation/model.md).
         collisions: how rows with fast constants collide: at one instant, "sequential" or "simultaneous", or
-            "resolved" in real time (spec 1.2). Rows with one set of constants are always resolved.
+            "resolved" in real time (docs/explanation/model.md). Rows with one set of constants are always resolved.
         solver: "compiled", "ida" or "cvode".
         samples: times of the rows; None for every step and both sides of every event.
         dense: give the motion `sol`, q and v at any instant of it by the integrator's own dense output. The run keeps

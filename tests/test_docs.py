@@ -23,6 +23,7 @@ from crossbody.reports.cli import cli, main
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
+FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 COMMENT = re.compile(r"#\s*exit code (\d)(?:: (.*))?$")
 
@@ -46,6 +47,15 @@ RUN = [page for page in PAGES if blocks(page)]
 def test_pages_have_blocks_and_no_unknown_language() -> None:
     assert len(RUN) >= 10
     assert {block.language for page in RUN for block in blocks(page)} == {"python", "bash", "toml"}
+
+
+def test_sources_cite_what_a_reader_has() -> None:
+    """Pages that are there, and no document that is not published with the sources."""
+    for path in (path for folder in FOLDERS for path in (DOCS.parent / folder).rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"\bspec \d|\bdecks?\b", text), path
+        for page in re.findall(r"\bdocs/[\w/-]+\.md\b", text):
+            assert (DOCS.parent / page).is_file(), (path, page)
 
 
 def test_every_command_is_in_the_reference() -> None:

@@ -1,6 +1,6 @@
 """A ball in a tilted maze of concentric rings that turns about its axis.
 
-q = (theta, x, y, phi): angle of the maze, ball centre, angle of the ball; gravity acts along -y (spec 2.3; Bortoff,
+q = (theta, x, y, phi): angle of the maze, ball centre, angle of the ball; gravity acts along -y (Bortoff,
 American Modelica Conference 2020). The torque on the maze balances the ball on a ring's outer face, brings a gap under
 it, drops it to the next ring and so to the centre.
 

@@ -1,6 +1,6 @@
 """A ball dropped on a floor that pushes back as a spring and damper, with a ballistic state.
 
-q = height of the lowest point, h = q (spec 2.1; Bortoff, American Modelica Conference 2020).
+q = height of the lowest point, h = q (Bortoff, American Modelica Conference 2020).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def _first_touch(p: Mapping[str, float]) -> float:
 
 
 def _impact_claims(p: Mapping[str, float]) -> Iterator[Claim]:
-    """One impact without gravity on a linear floor: the closed forms of spec 1.3."""
+    """One impact without gravity on a linear floor: its closed forms."""
     v0 = _impact_speed(p)
     if p["gravity"] or p["a2"] or not p["a0"] or not v0:
         return
@@ -75,7 +75,7 @@ def _impact_claims(p: Mapping[str, float]) -> Iterator[Claim]:
 
 
 def _undamped_claims(p: Mapping[str, float]) -> Iterator[Claim]:
-    """Without damping every bounce adds m (g h_e - a0 h_e^2/2 - a2 h_e^4/4), whatever the speed (spec 1.4)."""
+    """Without damping every bounce adds m (g h_e - a0 h_e^2/2 - a2 h_e^4/4), whatever the speed."""
     v0 = _impact_speed(p)
     if p["a1"] or not p["gravity"] or not (p["a0"] or p["a2"]) or not v0 or 2.0 * _first_touch(p) >= p["t_end"]:
         return

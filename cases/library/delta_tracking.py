@@ -1,7 +1,7 @@
 """The flange of a delta robot follows a circle under sampled control with delay and encoder quantisation.
 
 Every `period` the controller reads the motor angles, rounded to the encoder's counts, and sets the torques that take
-effect `delay` samples later (spec 3.6).
+effect `delay` samples later.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A row of balls, some of which strike the others: k in, k out, if collisions come one after another.
 
-Sliders are the collision problem alone; pendulums add strings and gravity (spec 2.2). Which collision rule is used
+Sliders are the collision problem alone; pendulums add strings and gravity. Which collision rule is used
 decides what comes out of balls that touch: `collisions`.
 """
 

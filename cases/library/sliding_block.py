@@ -1,6 +1,6 @@
 """A block on a slope with friction: it holds, slides and stops, turns, or goes downhill askew.
 
-x points downhill; q of a block that touches at one place is where it is on the slope (spec 7.5). `flat` is a free box
+x points downhill; q of a block that touches at one place is where it is on the slope. `flat` is a free box
 on its four lower corners.
 """
 

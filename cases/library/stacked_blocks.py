@@ -1,6 +1,6 @@
 """A block lies on a block on a floor; one is pushed: both rest, go together, or slide on each other.
 
-Which of these it is follows from the push, the masses and both coefficients of friction (spec 7.5). The pushes act at
+Which of these it is follows from the push, the masses and both coefficients of friction. The pushes act at
 the centres and tip nothing.
 """
 

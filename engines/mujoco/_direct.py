@@ -1,6 +1,6 @@
-"""The deck's linear law in MuJoCo's direct format, without the regularisation.
+"""The linear law in MuJoCo's direct format, without the regularisation.
 
-aref = -B h' - K d h with the impedance d = dmin = dmax at its largest, solref = (-K dmax^2, -B dmax) (spec 4.1, 4.2).
+aref = -B h' - K d h with the impedance d = dmin = dmax at its largest, solref = (-K dmax^2, -B dmax).
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ class MujocoRun(Run):
     def run(self) -> Trajectory:
         """Integrate from the start.
 
-        Forces are memoryless, lam = max(0, law) wherever a gap is closed (spec 4.1), unless the scene says otherwise.
+        Forces are memoryless, lam = max(0, law) wherever a gap is closed, unless the scene says otherwise.
         """
         case, scene = self.case, self.scene
         dt, limit = float(self.settings["dt"]), int(self.settings["max_steps"])

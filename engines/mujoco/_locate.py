@@ -1,4 +1,4 @@
-"""Cut a step at the first event of its rows: retry from the saved state with a smaller time step (spec 4.2)."""
+"""Cut a step at the first event of its rows: retry from the saved state with a smaller time step."""
 
 from __future__ import annotations
 

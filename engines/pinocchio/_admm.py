@@ -1,4 +1,4 @@
-"""Time stepping with impulses from ADMM: the LCP baseline, first order in the step (spec 4.3).
+"""Time stepping with impulses from ADMM: the LCP baseline, first order in the step (docs/explanation/engines.md).
 
 v+ = v + M^-1 ( dt (tau - b) + J^T p )        q+ = q + dt (theta v+ + (1 - theta) v)
 0 <= p  perp  J v+ + e J v >= 0               rows whose gap is closed half a step ahead (Moreau and Jean)

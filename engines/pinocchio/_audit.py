@@ -1,4 +1,4 @@
-"""The physics as it reached Pinocchio's model, for the parity audit (spec 5.3)."""
+"""The physics as it reached Pinocchio's model, for the parity audit (docs/explanation/verdicts.md)."""
 
 from __future__ import annotations
 

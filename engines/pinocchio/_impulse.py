@@ -1,4 +1,4 @@
-"""Impacts in no time: `impulseDynamics` with the restitution that the law's own collision has (spec 1.2, 1.3, 4.3)."""
+"""Impacts in no time: `impulseDynamics` with the restitution that the law's own collision has."""
 
 from __future__ import annotations
 

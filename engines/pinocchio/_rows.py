@@ -1,4 +1,4 @@
-"""The deck's law through Pinocchio: J v' + gamma = 0 with gamma = H' v + a1 h' + a0 h + a2 h^3 (spec 4.3)."""
+"""The law through Pinocchio: J v' + gamma = 0 with gamma = H' v + a1 h' + a0 h + a2 h^3."""
 
 from __future__ import annotations
 

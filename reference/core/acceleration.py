@@ -1,4 +1,4 @@
-"""Acceleration and multipliers: the right-hand side of the reduced model (spec 1.1).
+"""Acceleration and multipliers: the right-hand side of the reduced model (docs/explanation/model.md).
 
     (H_A M^-1 H_A^T) lam_A = -( H_A M^-1 f + H_A' v + a1 h' + a0 h + a2 h^3 )_A
     v' = M^-1 ( f + H_A^T lam_A )

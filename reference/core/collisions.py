@@ -1,4 +1,4 @@
-"""Frozen collisions: the fast time scale of a contact as one instant (spec 1.2).
+"""Frozen collisions: the fast time scale of a contact as one instant (docs/explanation/model.md).
 
 While a row with fast constants collides, q, M and H stand still, so its law has the exact solution
 
@@ -45,7 +45,7 @@ NOT, BOUNCES, STAYS = np.arange(3)  # how a row takes part: not, struck, or touc
 
 @compiled
 def restitution(b0: float, b1: float) -> float:
-    """Speed after over speed before of one linear contact: exp(-2 zeta Theta(zeta)) (spec 1.3)."""
+    """Speed after over speed before of one linear contact: exp(-2 zeta Theta(zeta)) (docs/explanation/model.md)."""
     zeta = 0.5 * b1 / np.sqrt(b0)
     if abs(zeta - 1.0) < 1e-6:
         theta = 1.0 + (1.0 - zeta) / 3.0

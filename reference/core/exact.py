@@ -47,7 +47,7 @@ def linear_arc(a0: float, a1: float, h: float, hd: float, t: float) -> tuple[flo
 
 @compiled
 def _half_contact(a0: float, a1: float) -> float:
-    """Half the duration of a contact that starts at h = 0 (spec 1.3): the natural length of an arc."""
+    """Half the duration of a contact that starts at h = 0 (docs/explanation/model.md): the natural length of an arc."""
     if a0 == 0.0:
         return np.inf if a1 == 0.0 else 1.0 / a1
     omega = np.sqrt(a0)

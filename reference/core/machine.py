@@ -1,4 +1,4 @@
-"""The state machines (spec 1.2): what is switched at one instant, until nothing changes any more.
+"""The state machines (docs/explanation/model.md): what is switched at one instant, until nothing changes any more.
 
     level        FREE -> active        h <= 0 and (h' < 0 or h < 0)
                  active -> BALLISTIC   lam < 0, h <= 0         active -> FREE        lam < 0, h > 0
@@ -305,7 +305,7 @@ def change_of_acceleration(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: in
 def _own_press(K: Any, s: Any, m: Model, w: Work, i: int, at_rest: bool) -> bool:
     """Whether lam of row i would be positive: the rest of its law is negative with the others as they are.
 
-    Lam of a row that joins is that rest over a positive number, so its sign needs no solution. A row at rest (spec 1.2)
+    Lam of a row that joins is that rest over a positive number, so its sign needs no solution. A row at rest
     has no law yet: what is left of its gap and its rate is what collisions left, and presses nothing.
     """
     nq, j = s.nq, s.na

@@ -1,4 +1,4 @@
-"""The delta robot as a library: parameters, kinematics, statics, control and references (spec 3).
+"""The delta robot as a library: parameters, kinematics, statics, control and references.
 
 from crossbody.reference import delta
 robot = delta.LIGHT

@@ -1,4 +1,4 @@
-"""Sampled control of the delta robot: the law, how it is sampled, and its tables for the kernels (spec 3.6)."""
+"""Sampled control of the delta robot: the law, how it is sampled, and its tables for the kernels."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Linearising:
     Attributes:
         gains: at all times, or at given instants (s), linear between them.
         clamp: bound on |INT e| in each axis, m s (anti-windup).
-        exact: My = S^T M S; else the deck's M11 - M12 h_x^-1 h_y.
+        exact: My = S^T M S; else the approximation M11 - M12 h_x^-1 h_y.
         feedforward: add r''.
         friction: add the reflected viscous friction of the robot; without it the damping of the loop is larger.
     """

@@ -1,4 +1,4 @@
-"""Forward and inverse kinematics and the two Jacobians, with errors that say what cannot be reached (spec 3.4)."""
+"""Forward and inverse kinematics and the two Jacobians, with errors that say what cannot be reached."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The controlled robot as a linear model in continuous time, about a pose at which it is held (spec 3.6).
+"""The controlled robot as a linear model in continuous time, about a pose at which it is held.
 
 The plant is linearised with the loops closed exactly, in the flange's own coordinates through the virtual Jacobian Jv
 of the simulation. The controller computes with the control Jacobian Jy; its own compiled code is differenced.

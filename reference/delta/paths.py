@@ -1,4 +1,4 @@
-"""References for the flange: smooth moves, circles, and recorded ones (spec 3.6).
+"""References for the flange: smooth moves, circles, and recorded ones.
 
 Each function returns a path: times (n,) to position, velocity and acceleration, (n, 3) each.
 """

@@ -17,7 +17,7 @@ from crossbody.reference.kinds import Floats
 @checked_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robot:
-    """Geometry, masses, gravity and friction (spec 3.2); the defaults are the `light` set.
+    """Geometry, masses, gravity and friction; the defaults are the `light` set.
 
     Attributes:
         r_base, r_flange: radii at which the arms are hinged, m.

@@ -1,4 +1,4 @@
-"""Robot, servos and controller from the named numbers of a scene (spec 2.4).
+"""Robot, servos and controller from the named numbers of a scene.
 
 every scene: r_base r_flange l1 l2 m1 m2 m3 jm gravity d1 d2 d3 sign
 start of most: x y z, the flange, m

@@ -1,4 +1,4 @@
-"""Where the robot's kinematics ends, and how far a pose is from there (spec 3.5)."""
+"""Where the robot's kinematics ends, and how far a pose is from there."""
 
 from __future__ import annotations
 

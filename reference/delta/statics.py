@@ -1,4 +1,4 @@
-"""What the motors carry: gravity and the mass felt at them (spec 3.6)."""
+"""What the motors carry: gravity and the mass felt at them."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def task_mass(robot: Robot, q: ArrayLike, *, exact: bool = True) -> Floats:
     Args:
         robot: the robot.
         q (9,): a closed pose, rad.
-        exact: S^T M S with S = [I; X]; else the deck's M11 - M12 h_x^-1 h_y, without the reflected constraint force.
+        exact: S^T M S with S = [I; X]; else the approximation M11 - M12 h_x^-1 h_y, without the reflected constraint force.
 
     Raises:
         SceneError: if the control Jacobian is singular.

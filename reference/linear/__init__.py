@@ -1,4 +1,4 @@
-"""Analysis of a mechanism in a given set of modes (spec 2.7): what simulation alone does not tell.
+"""Analysis of a mechanism in a given set of modes: what simulation alone does not tell.
 
     from crossbody.reference.linear import linearise
     model = linearise(system, q, v, active=[0, 1])       # dx' = A dx + B du, dy = C dx + D du

@@ -24,7 +24,7 @@ from crossbody.reference.linear._point import STEP, Point, dense, directions, ga
 from crossbody.reference.linear._rubbing import borne, check_cones, check_idle, check_jam, check_slips, loads
 
 ILL_POSED = 1e10
-"""Above this condition of H M^-1 H^T the multipliers, and so their derivatives, are ill posed (spec 3.5)."""
+"""Above this condition of H M^-1 H^T the multipliers, and so their derivatives, are ill posed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

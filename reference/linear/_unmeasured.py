@@ -1,4 +1,4 @@
-"""Forces that were not measured: which are looked for, in what record, and how they are given back (spec 2.7, 5.7).
+"""Forces that were not measured: which are looked for, in what record, and how they are given back.
 
 Unknown forces F are inputs of the mechanism (a force on the flange) or multipliers of rows whose law is not trusted:
 

@@ -25,7 +25,7 @@ from crossbody.reference.linear._point import STEP, Point, dense, directions, ga
 from crossbody.reference.linear._rubbing import borne, loads
 
 HANDOVER = 0.01
-"""Elastic part of lam at which COLLISION becomes CONTACT (spec 1.2)."""
+"""Elastic part of lam at which COLLISION becomes CONTACT (docs/explanation/model.md)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,7 +182,7 @@ def lam_gradient(at: Point, over: Theta, i: int) -> Floats:
 
 
 def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
-    """Of max(b1, sqrt(b0)) |h'| + b0 |h| - HANDOVER lam_i/(G^-1)_ii, where a collision is spent (spec 1.2)."""
+    """Of max(b1, sqrt(b0)) |h'| + b0 |h| - HANDOVER lam_i/(G^-1)_ii, where a collision is spent."""
     j, n = at.active.tolist().index(i), at.system.n
     _, lam, slope = slopes(at, over)
     b0, b1, _ = at.system.beta[i]
@@ -207,7 +207,7 @@ def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
 
 
 def bounced(at: Point, i: int, captured: bool) -> Callable[[Point, Array, Array], Array]:
-    """The map (q, v) -> v+ of a frozen collision of row i while the other active rows stay held (spec 1.2)."""
+    """The map (q, v) -> v+ of a frozen collision of row i while the other active rows stay held."""
     j = at.active.tolist().index(i)
     b0, b1, _ = at.system.beta[i]
     share = 1.0 if captured else 1.0 + restitution(damping_ratio(float(b0), float(b1)))

@@ -1,4 +1,4 @@
-"""Forces of one set of modes, of contacts with Coulomb friction and rows with dry friction (spec 7.1, 7.3).
+"""Forces of one set of modes, of contacts with Coulomb friction and rows with dry friction.
 
 With G = H M^-1 H^T of all rows in contact and b what their laws ask for, a set of modes has G lam = b in the rows that
 are solved for, and lam_t = -mu lam_n s in those that slide. Where these depend on each other the normal rows come

@@ -1,4 +1,4 @@
-"""Frozen collisions of rows with fast constants (spec 1.2), in plain Python: the check on the compiled ones.
+"""Frozen collisions of rows with fast constants, in plain Python: the check on the compiled ones.
 
 The fast system, M and H frozen and a0, a1 those of COLLISION, is linear. From h = 0 until lam = 0 its solution is
 

@@ -1,7 +1,7 @@
 """The reduced equations in plain Python, one evaluation a call: slow, and independent of the compiled loop.
 
     [ M   -H_A^T ] [ v'  ]   [ f                                          ]
-    [ H_A    0   ] [ lam ] = [ -(H_A' v + a1 h' + a0 h + a2 h^3)_A        ]      spec 1.1
+    [ H_A    0   ] [ lam ] = [ -(H_A' v + a1 h' + a0 h + a2 h^3)_A        ]
 
 The mechanism's kernels are called from Python, but not its own `solve`: the whole matrix is solved by LU with partial
 pivoting.

@@ -1,4 +1,4 @@
-"""Modes of contacts with friction, written apart from the compiled machine's rules (spec 7.2, 7.3).
+"""Modes of contacts with friction, written apart from the compiled machine's rules (docs/explanation/contacts.md).
 
     touching -> STICK or SLIP   h <= 0 and closing, or pressing
     STICK -> SLIP               |lam_t| > mu lam_n, without what pulls the row back; or |v_t| no longer small: several

@@ -1,4 +1,4 @@
-"""The level machine with frozen collisions (spec 1.2), in plain Python: the check on the compiled one.
+"""The level machine with frozen collisions (docs/explanation/model.md), in plain Python: the check on the compiled one.
 
 A touching row with fast constants collides at one instant, by one of the rules of `_collisions`, until no touching gap
 closes any more. At rest it is in CONTACT if it presses, with its slow constants, else FREE.

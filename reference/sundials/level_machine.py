@@ -1,4 +1,4 @@
-"""The level machine of spec 1.2 in plain Python: the check on the compiled one.
+"""The level machine in plain Python: the check on the compiled one.
 
     FREE -> active        h <= 0 and (h' < 0 or h < 0)
     active -> BALLISTIC   lam < 0, h <= 0         active -> FREE        lam < 0, h > 0

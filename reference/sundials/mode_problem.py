@@ -1,4 +1,4 @@
-"""Which contacts stick, slide and let go where several may change at once, apart from the compiled rules (spec 7.3).
+"""Which contacts stick, slide and let go where several may change at once, apart from the compiled rules.
 
 All that stand stick, then all that is violated changes, then what a projected Gauss-Seidel method converges to is
 taken, then sets that differ in few contacts. Directions in which contacts begin to slide are those of their

@@ -1,4 +1,4 @@
-"""Rows in contact where some have Coulomb friction, as they stand at one instant (spec 7.1)."""
+"""Rows in contact where some have Coulomb friction, as they stand at one instant (docs/explanation/contacts.md)."""
 
 from __future__ import annotations
 

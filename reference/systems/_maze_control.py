@@ -1,4 +1,4 @@
-"""Torque that balances the ball, snatches a gap under it, and damps it in the centre (spec 2.3).
+"""Torque that balances the ball, snatches a gap under it, and damps it in the centre.
 
 The ball rolls on a face of radius R, rho = R + r outside or R - r inside, at the angle b; k = J/r^2 and kk = k/mb:
 

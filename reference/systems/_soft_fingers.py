@@ -1,4 +1,4 @@
-"""Two fingers with soft pads around a block, their sensors and the tactile loop (spec 2.6).
+"""Two fingers with soft pads around a block, their sensors and the tactile loop.
 
 Bortoff, Modeling Contact and Collisions for Robotic Assembly Control, American Modelica Conference 2020. Each pad is a
 small mass before a spring and a damper on its finger; the faces of the pads and the block are what touches.

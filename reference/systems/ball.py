@@ -1,4 +1,4 @@
-"""A ball above a floor (spec 2.1): q = height of its lowest point, h = q.
+"""A ball above a floor: q = height of its lowest point, h = q.
 
 Parameters p = (mass kg, gravity m/s^2).
 """

@@ -1,4 +1,4 @@
-"""The delta robot as the mechanism of a case (spec 3), see `crossbody.reference.delta`."""
+"""The delta robot as the mechanism of a case, see `crossbody.reference.delta`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A ball among concentric rings that turn about their common axis (spec 2.3).
+"""A ball among concentric rings that turn about their common axis.
 
 q = (theta, x, y, phi): maze, ball centre, spin of the ball. M = diag(Jm, mb, mb, Jb); gravity along -y; the input is
 the torque on the maze, N m. With s = 1 for a face that the ball is inside of, s = -1 for one that it is outside of,

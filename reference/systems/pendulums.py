@@ -1,4 +1,4 @@
-"""Planar pendulums side by side (spec 2.2): q_i = angle of string i, counter-clockwise from hanging.
+"""Planar pendulums side by side: q_i = angle of string i, counter-clockwise from hanging.
 
 Ball i is a point mass at c_i = (i D + L sin q_i, -L cos q_i) with a circle of radius r around it, D = 2 r + gap the
 distance of the pivots. With a = (q_i + q_(i+1))/2, b = (q_(i+1) - q_i)/2:

@@ -1,4 +1,4 @@
-"""A box that falls on a slab which rests on two feet: five constraints between two bodies in a plane (spec 2.5).
+"""A box that falls on a slab which rests on two feet: five constraints between two bodies in a plane.
 
 q = (x, y, th, X, Y, Ph): centre and angle of the box, centre and angle of the slab, counter-clockwise; y is up, the
 floor is y = 0. With n = (-sin Ph, cos Ph), s = (cos Ph, sin Ph) and the lower corners r = R(th) (-+a, -b) of the box:

@@ -1,4 +1,4 @@
-"""Balls on a line without gravity (spec 2.2): q_i = displacement from its place, h_i = gap + q_(i+1) - q_i.
+"""Balls on a line without gravity: q_i = displacement from its place, h_i = gap + q_(i+1) - q_i.
 
 Parameters p = (gap m, masses kg (n,)). Every row touches two coordinates: its cost does not depend on n.
 """

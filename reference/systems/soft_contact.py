@@ -1,4 +1,4 @@
-"""A block between two soft fingers on one horizontal axis, with tactile feedback (spec 2.6).
+"""A block between two soft fingers on one horizontal axis, with tactile feedback.
 
 q = (x flange, pL, pR faces of the pads, b block, I, SL, SR, Z). The last four carry the controller and the sensors:
 

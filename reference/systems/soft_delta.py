@@ -1,4 +1,4 @@
-"""A delta robot with two soft fingers and a free block on a table, with tactile feedback (spec 2.6 and 3).
+"""A delta robot with two soft fingers and a free block on a table, with tactile feedback.
 
 q = (nine angles, pL, pR, S, block b1 b2 b3, I1, I2, I3): pads move along x on the flange, the block has three
 translations, z points down. As in `soft_contact`, but for the sensors, of which the loop needs the difference alone:
@@ -8,7 +8,7 @@ translations, z points down. As in `soft_contact`, but for the sensors, of which
     that comes down, waits and rises
 
 Motor torques tau = My Jy^-1 (ki I + kp I' + kd I'' + r'') + tau_g linearise the flange's motion with the exact My and
-without terms in the velocities (spec 3.6); r1'' is left out. Forces of the pads act on the flange through Jv^T.
+without terms in the velocities; r1'' is left out. Forces of the pads act on the flange through Jv^T.
 Rows: the six closures, left pad, right pad, table. Inputs u = a force on the flange, N.
 Parameters p: those of the robot and its (idle) servos, of `_soft_fingers`, and `PATH`.
 """

@@ -1,4 +1,4 @@
-"""Frequency responses of a case about an equilibrium, in the modes of that equilibrium (spec 2.6, 2.7).
+"""Frequency responses of a case about an equilibrium, in the modes of that equilibrium.
 
 Today the soft contact: from the velocity of the fingers to the difference of the contact forces and to the velocity of
 the block, held by both fingers, with and without tactile feedback.

@@ -1,4 +1,4 @@
-"""Equilibria of a case, each in a mode set, with the linear model there (spec 2.7).
+"""Equilibria of a case, each in a mode set, with the linear model there.
 
 The model at a place is minimal: rows that are held stay held, unless their law is what is looked at (a ball in contact,
 soft fingers). What acts from outside on a scene is held at what it is there. A mechanism without a list of places is

@@ -1,4 +1,4 @@
-"""Run time against error over ladders of tolerances and steps (spec 5.4).
+"""Run time against error over ladders of tolerances and steps (docs/explanation/verdicts.md).
 
 Models are built and warmed before the clock; the runs are interleaved, one round after another, so that a slow minute
 of the machine falls on all of them. Every row has two times: the run itself, as the engine's adapter clocks it, and

@@ -1,4 +1,4 @@
-"""What a scene does not need costs nothing: measured as ratios within one run, and as counts (spec 5.6)."""
+"""What a scene does not need costs nothing: measured as ratios within one run, and as counts."""
 
 from __future__ import annotations
 

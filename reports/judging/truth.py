@@ -1,4 +1,4 @@
-"""What a run is judged against, and how that is known (spec 5.2)."""
+"""What a run is judged against, and how that is known (docs/explanation/verdicts.md)."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
 
 
 def law_of(case: Case) -> Truth | None:
-    """The truth of the equations that an engine really integrates, where they are not the case's own (spec 4.1).
+    """The truth of the equations that an engine really integrates, where they are not the case's own.
 
     Against it an engine has a step error alone. It is known by the reference itself (tier D).
 

@@ -1,7 +1,7 @@
 """The gap map: how far apart balls must hang for an engine to give the ideal pattern, and what energy it makes before.
 
 s = gap sqrt(a0) / v is the gap over the deepest penetration of one pair. From s = 0, where collisions overlap, to s of
-some units, where they are over before the next begins (spec 2.2).
+some units, where they are over before the next begins.
 """
 
 from __future__ import annotations

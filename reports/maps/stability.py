@@ -1,7 +1,7 @@
 """The stability map of the closed-loop ball maze: from which scenes the ball still comes to the centre.
 
 Each point changes the default run in one thing: a bound, a gain, the model that the controller believes in, the
-start, or how it is sampled. What is published of that run (spec 2.3) stands beside what was found; where a ball
+start, or how it is sampled. What is published of that run stands beside what was found; where a ball
 tumbles through several rings the outcome hangs on the last digits, and nothing is expected.
 """
 

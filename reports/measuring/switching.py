@@ -1,4 +1,4 @@
-"""Energy that a contact law makes where rows are switched (spec 1.2).
+"""Energy that a contact law makes where rows are switched (docs/explanation/model.md).
 
 With one a0 the active rows A have the potential 1/2 a0 h_A^T G_A^-1 h_A, G = H M^-1 H^T. Another set of rows at the
 same state has another one, and lam books the difference:

@@ -1,6 +1,6 @@
 """Energy that the integrator made or lost, over the largest kinetic energy or the swing of the potential.
 
-What is left of E(t) - E(0) after the work of the inputs, of every multiplier and of damping (spec 1.4).
+What is left of E(t) - E(0) after the work of the inputs, of every multiplier and of damping.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Net energy that the contact law has given at most, over the largest kinetic energy.
 
-From the run's own account of the work of every multiplier (spec 1.4): above zero, the law made energy.
+From the run's own account of the work of every multiplier (docs/explanation/model.md): above zero, the law made energy.
 """
 
 from __future__ import annotations

@@ -222,7 +222,7 @@ def _distance(other: Trajectory, run: Trajectory, times: Floats) -> Floats:
 
 
 def residual(run: Trajectory) -> float:
-    """What the energy account leaves open (spec 1.4), over the largest energy that moved, stood or was turned over.
+    """What the energy account leaves open, over the largest energy that moved, stood or was turned over.
 
     NaN without an account.
     """

@@ -146,7 +146,7 @@ def test_pulse_under_servos_agrees_with_pinocchio():
 
 
 def swing(robot, kp, kd, hit):
-    """Times and flange of spec 2.4: ramp to the elbow pose in 4 s, a pulse along x at 10 s, 35 s in all."""
+    """Times and flange of the published run: ramp to the elbow pose in 4 s, a pulse along x at 10 s, 35 s in all."""
     end = delta.elbow_angle(robot)
     servo = delta.Servo(kp=kp, kd=kd, end=4.0, y_start=(np.pi / 4,) * 3, y_end=(end,) * 3, feedforward=True)
     inputs = pulse(np.zeros(6), hit, 10.0, 0.05)

@@ -1,4 +1,4 @@
-"""The energy account of spec 1.4: E(t) - E(0) = input - dissipated + work of every row."""
+"""The energy account: E(t) - E(0) = input - dissipated + work of every row."""
 
 from dataclasses import replace
 

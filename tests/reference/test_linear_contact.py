@@ -1,4 +1,4 @@
-"""One linear contact against the closed forms of spec 1.3, integrated and by shortcut."""
+"""One linear contact against its closed forms, integrated and by shortcut."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""What touching balls on a line do at one instant, under the two frozen rules (spec 1.2).
+"""What touching balls on a line do at one instant, under the two frozen rules (docs/explanation/model.md).
 
     sequential     the most approaching contact collides alone, then the next, until none approaches
     simultaneous   all at once: impulses J >= 0, h'+ + e h'- >= 0, and J is 0 where that is not 0 (Newton's law of

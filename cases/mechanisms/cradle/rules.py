@@ -1,10 +1,10 @@
-"""What comes out of Newton's cradle under each collision rule, by name (spec 2.2).
+"""What comes out of Newton's cradle under each collision rule, by name.
 
     sequential     one collision after another: the truth of the case
     simultaneous   all at once, as a complementarity problem
     block          each half as one rigid body; it keeps energy and momentum, so that neither check sees it
     linear, hertz  compliant chains, by direct integration (elastic balls only)
-    memoryless     the contact law of spec 1.1 on all overlapping pairs together, by direct integration
+    memoryless     the contact law on all overlapping pairs together, by direct integration
 
 An engine's answer laid beside them says which rule it follows.
 """

@@ -1,4 +1,4 @@
-"""Newton's cradle as numbers: masses, start and law of a row of balls (spec 2.2).
+"""Newton's cradle as numbers: masses, start and law of a row of balls.
 
 Two forms share them. Sliders: q_i is the displacement of ball i from its place at the start, so that touching
 neighbours have a gap of exactly 0; h_i = gap + q_(i+1) - q_i. Pendulums: q_i is the angle of string i from the
@@ -53,7 +53,7 @@ class Row:
 
     @property
     def e(self) -> float:
-        """Restitution of one collision (spec 1.3)."""
+        """Restitution of one collision (docs/explanation/model.md)."""
         return cf.restitution(self.zeta)
 
     @property
@@ -105,7 +105,7 @@ def law(balls: Row, collisions: str) -> RowLaw:
     A frozen collision takes no time, so its constants are those of COLLISION, beta = (a0, 2 zeta sqrt(a0)). What is
     captured is held with a hundredth of their frequency and no oscillation (a double pole): it starts at h = h' = 0,
     has nothing to work off, and must not make the equations stiff again. Resolved, one set does everything: a second
-    one would change the potential of spec 1.2 at the hand-over, and with it what is to be shown.
+    one would change the potential of the law at the hand-over, and with it what is to be shown.
     """
     w = math.sqrt(balls.a0)
     a0, a1 = balls.a0, 2.0 * balls.zeta * w

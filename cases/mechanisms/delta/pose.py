@@ -1,4 +1,4 @@
-"""Closed forms of the delta robot that its cases start from: pose, holding torque, kick (spec 3.1, 3.2, 3.4).
+"""Closed forms of the delta robot that its cases start from: pose, holding torque, kick.
 
 Written here once more, as matrices: a case is plain data and knows no equations of the reference.
 """
@@ -152,7 +152,7 @@ def kicked(p: Numbers, q: Floats, impulse: Floats) -> Floats:
 
 
 def elbow_angle(p: Numbers) -> float:
-    """The motor angle y* at which the elbows coincide, rad: R + l1 cos y* = 0 (spec 3.5).
+    """The motor angle y* at which the elbows coincide, rad: R + l1 cos y* = 0.
 
     Raises:
         InvalidValue: if the proximal links are too short for that.
@@ -163,6 +163,6 @@ def elbow_angle(p: Numbers) -> float:
 
 
 def swing_period(p: Numbers) -> float:
-    """Period of small swings with the elbows together, s: w^2 = g (1.5 m2 + m3)/(l2 (m2 + m3)) (spec 3.5)."""
+    """Period of small swings with the elbows together, s: w^2 = g (1.5 m2 + m3)/(l2 (m2 + m3))."""
     m2, m3 = p["m2"], p["m3"]
     return 2.0 * math.pi / math.sqrt(p["gravity"] * (1.5 * m2 + m3) / (p["l2"] * (m2 + m3)))

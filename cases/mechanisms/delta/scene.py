@@ -1,4 +1,4 @@
-"""What the cases of the delta robot share: its numbers, names, and the closures' law (spec 3.2, 3.3)."""
+"""What the cases of the delta robot share: its numbers, names, and the closures' law."""
 
 from __future__ import annotations
 

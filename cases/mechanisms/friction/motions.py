@@ -1,4 +1,4 @@
-"""Exact motions with friction: how a body slides on a slope and stops, turns or goes on (spec 7.5).
+"""Exact motions with friction: how a body slides on a slope and stops, turns or goes on (docs/explanation/contacts.md).
 
 A is the acceleration downhill, B = mu g cos(slope) that of friction. Straight slides are parabolas. An oblique one
 turns downhill: with th from downhill, u = tan(th/2) and kappa = B/A,

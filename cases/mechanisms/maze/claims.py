@@ -1,4 +1,4 @@
-"""Numbers that must come out of the ball maze, from its closed forms (spec 2.3)."""
+"""Numbers that must come out of the ball maze, from its closed forms."""
 
 from __future__ import annotations
 

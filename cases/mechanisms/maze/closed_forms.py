@@ -1,4 +1,4 @@
-"""What a ball that rolls on a ring's face does, in closed form (spec 2.3).
+"""What a ball that rolls on a ring's face does, in closed form.
 
 R is the radius of the face, rho the radius of the circle of the ball's centre: R + r on an outer face, R - r inside.
 With k = J/r^2 = 2/5 m of a solid ball, Jm the maze's inertia (infinite where it is locked), and no input, rolling

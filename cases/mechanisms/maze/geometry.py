@@ -1,4 +1,4 @@
-"""Rings, gaps and tips of the ball maze (spec 2.3).
+"""Rings, gaps and tips of the ball maze.
 
 Angles count counter-clockwise from +x in the maze's own frame; gravity points along -y. A gap is a sector between two
 tips: the ends of a ring's wall are caps of radius w/2, w = outer - inner, centred on the circle of radius

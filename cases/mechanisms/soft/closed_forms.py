@@ -7,7 +7,7 @@ With both contacts held the pads move with the block, m' = mb + 2 mp. In the Lap
     N = -( PID (k/s) Sn Zn + s Z/mf )/D
     Xb/U = (T/s)/(1 - T N)      block velocity/U = s Xb/U      (lam_L - lam_R)/U = Zn Xb/U
 
-for a velocity U of both fingers against the flange (spec 2.6, derived there and checked against the state space).
+for a velocity U of both fingers against the flange (checked against the state space).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One arm of the delta robot: position, Jacobian, inertia and forces (spec 3.1 and 3.2).
+"""One arm of the delta robot: position, Jacobian, inertia and forces.
 
 The proximal link moves its end along n = (0, -s1, c1); the distal link points along d = (s2 s3, c2, s2 c3) and
 turns about it along e2 = (c2 s3, -s2, c2 c3) and e3 = (c3, 0, -s3), which are orthonormal with d.
@@ -31,7 +31,7 @@ def geometry(p: Array) -> Any:
 
 @kernels.helper
 def inertia(p: Array) -> Any:
-    """A, Bc, Cc of spec 3.2, kg m^2."""
+    """Inertias of the upper link and what it carries, of both together, and of the lower link, kg m^2."""
     l1, l2, m1, m2, m3 = p[2], p[3], p[4], p[5], p[6]
     third = m3 * _THIRD
     return (m1 * _THIRD + m2 + third) * l1 * l1 + p[7], (0.5 * m2 + third) * l1 * l2, (m2 * _THIRD + third) * l2 * l2
@@ -143,7 +143,7 @@ def gravity(T: Any, k1: Any, k2: Any) -> Any:
 
 @kernels.helper
 def centrifugal(T: Any, B: Any, C: Any, a: Any, b: Any, w: Any) -> Any:
-    """The terms c of spec 3.2 that are quadratic in the velocities, N m."""
+    """The terms that are quadratic in the velocities, N m."""
     c1, s1, c2, s2, c3, s3 = T
     return (
         B * ((s1 * c2 - c1 * s2 * c3) * b * b - c1 * s2 * c3 * w * w - 2 * c1 * c2 * s3 * b * w),

@@ -1,4 +1,4 @@
-"""Sampled controllers of the delta robot, called at ticks (spec 3.6).
+"""Sampled controllers of the delta robot, called at ticks.
 
 Their numbers stand in the parameters p from `FIRST` on: a header (`HEADER`), the knots of the gains, and the reference
 at every tick. Their state s holds what a rig's computer remembers (`STATE`). A pose at which the control Jacobian is

@@ -1,4 +1,4 @@
-"""Kinematics of the closed robot in compiled code (spec 3.4).
+"""Kinematics of the closed robot in compiled code.
 
 With R_i d_i the directions of the distal links in the base frame, stacked as the rows of D, a motion z' of the flange
 and the rates y' of the motors obey D z' = diag(l1 n_i . d_i) y', since e2 and e3 are orthogonal to d. Therefore the

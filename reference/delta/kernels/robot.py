@@ -1,4 +1,4 @@
-"""The delta robot: three arms of three absolute angles, closed by six equations (spec 3).
+"""The delta robot: three arms of three absolute angles, closed by six equations.
 
 q = (q11, q12, q13, q21, ..., q33); z points down. Parameters p are those of `PARAMETERS`, then the servos'
 reference (`SERVO_FROM`, `SERVO_TO`: three angles each), then the tables of a sampled controller if there is one.

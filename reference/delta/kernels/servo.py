@@ -1,4 +1,4 @@
-"""Continuous servos on the three motors: PD towards a reference that moves once, smoothly (spec 2.4 and 3.5).
+"""Continuous servos on the three motors: PD towards a reference that moves once, smoothly.
 
     u_i = kp (y_ref,i - y_i) + kd (y_ref,i' - y_i') + feed-forward
 

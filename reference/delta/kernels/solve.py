@@ -1,4 +1,4 @@
-"""Accelerations and multipliers of the delta robot by blocks: no dense 9 x 9 or 15 x 15 system (spec 3.2).
+"""Accelerations and multipliers of the delta robot by blocks: no dense 9 x 9 or 15 x 15 system.
 
 The third rate of each arm is scaled, s2 w: the mass block becomes [[A, Bc P, Bc Q/s2], [., Cc, 0], [., 0, Cc]] and the
 Jacobian [l1 n, l2 e2, l2 e3]. Since e2, e3, d are orthonormal, its Schur complement S and W = dpsi M^-1 dpsi^T are
