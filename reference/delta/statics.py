@@ -68,7 +68,7 @@ def task_mass(robot: Robot, q: ArrayLike, *, exact: bool = True) -> Floats:
     Args:
         robot: the robot.
         q (9,): a closed pose, rad.
-        exact: S^T M S with S = [I; X]; else the approximation M11 - M12 h_x^-1 h_y, without the reflected constraint force.
+        exact: S^T M S with S = [I; X]; else M11 - M12 h_x^-1 h_y, without the reflected constraint force.
 
     Raises:
         SceneError: if the control Jacobian is singular.

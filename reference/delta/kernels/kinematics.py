@@ -203,7 +203,7 @@ def _coupled(T: Any, B: Any, i: int) -> Any:
 
 @kernels.helper
 def fill_mass(p: Floats, T: Any, X: Any, exact: bool, My: Floats) -> None:
-    """My = S^T M S, or its deck's approximation M11 - M12 h_x^-1 h_y, kg m^2."""
+    """My = S^T M S, or its approximation M11 - M12 h_x^-1 h_y, kg m^2."""
     A, B, C = inertia(p)
     My[:] = 0.0
     for i in range(3):
