@@ -36,6 +36,8 @@ TRACED = {KEPT: None, "yes": True, "no": False}
 _ROWS, _STATE = re.compile(r"\b[Rr]ows? \[(\d+(?:, \d+)*)\]"), re.compile(r", q = \[[^]]*\], v = \[[^]]*\]")
 LONG = 16
 """Most numbers of a state that a message shows."""
+ROUNDING = 1e-12
+"""Change of a coordinate that is none."""
 SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
@@ -209,11 +211,13 @@ def _off(case: Case, error: OffRowsError) -> str:
     """Return what is wrong with the start of a file and what its user can do, in the file's names."""
     advice = NOT_FOUND
     if error.near is not None:
-        moved = np.abs(error.near[0] - case.q0)
+        kind, moved, named = "", np.abs(error.near[0] - case.q0), case.coordinates
+        if moved.max() < ROUNDING:
+            kind, moved, named = "the velocity ", np.abs(error.near[1] - case.v0), case.velocities
         most = int(np.argmax(moved))
         advice = (
-            "--set assemble=1 starts in every engine at the nearest that is on them, which moves "
-            f"{case.coordinates[most].name!r} by {moved[most]:.3g} and no other coordinate further."
+            "--set assemble=1 starts in every engine at the nearest that is on them, which changes "
+            f"{kind}{named[most].name!r} by {moved[most]:.3g} and no other further."
         )
     return (
         f"{case.label}: the start is off {case.contacts[error.row]!r}, which is always on: {error.off}. "

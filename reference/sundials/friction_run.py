@@ -20,6 +20,7 @@ from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachin
 from crossbody.reference.sundials.run import CAUTION, SundialsRun
 
 APART, APART_PART = 1e-7, 0.1  # of positions, and part of a slip without a direction: steps of differences
+RESOLVED = 64.0 * float(np.finfo(np.float64).eps)  # part of a velocity by which such a step differs from none
 ACCOUNTED = 0.3  # part of the solver's tolerance where an account is kept: the work of forces that change their ways
 STIFF = 10.0  # times the fastest pole of the rows
 
@@ -74,7 +75,7 @@ class SlidingArc(DenseStep):
         moved, slopes, small = np.array(y), np.empty(len(y)), self.run.friction.small
         J[:] = 0.0
         for k in range(self.ny):
-            step = APART * max(1.0, abs(y[k])) if k < self.nq else APART_PART * small
+            step = APART * max(1.0, abs(y[k])) if k < self.nq else max(APART_PART * small, RESOLVED * abs(y[k]))
             moved[k] = y[k] + step
             self._slopes(t, moved, slopes)
             J[:, k] = (slopes - yp) / (moved[k] - y[k])

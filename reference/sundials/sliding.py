@@ -13,6 +13,7 @@ from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.balance import Balance, Unknowns
 from crossbody.reference.sundials.equations import Ended, Equations
 
+DRIFT = 1e-6  # part of positions and velocities by which loops may hold a contact off its surface
 HELD = 1e-10  # part of what moves a row without loops, below which it is rounding
 
 
@@ -126,7 +127,9 @@ class Sliding:
         slides = np.array([row in self.normal for row in rows], dtype=bool)
         bare = -(_times(H, vd) + Hdv) - np.where(slides, 0.0, law)
         if self.loops:
-            self._leave_held(M, H, G, bare, rows)
+            near = DRIFT * (a0[:count] * (1.0 + np.abs(q).max()) + a1[:count] * np.abs(v).max())
+            terms = np.abs(_times(H, vd)) + np.abs(Hdv) + np.abs(law)
+            self._leave_held(M, H, G, bare, near + HELD * terms, rows)
         at = {row: k for k, row in enumerate(rows)}
         return Seen(
             rows, at, G, bare, np.where(slides, -law, 0.0), rate[..., :count], X, vd, solved[..., n:, :-1],
@@ -154,16 +157,16 @@ class Sliding:
             raise Ended(Outcome.NOT_FINITE)
         return solved
 
-    def _leave_held(self, M: Floats, H: Floats, G: Floats, bare: Floats, rows: list[int]) -> None:
-        """Put zeros for rows that loops hold, so that nothing moves them but rounding.
+    def _leave_held(self, M: Floats, H: Floats, G: Floats, bare: Floats, least: Floats, rows: list[int]) -> None:
+        """Put zeros for rows that loops hold, so that nothing moves them but rounding: they bear nothing.
 
         Raises:
-            Ended: ILL_POSED for a contact: how hard it presses no law says.
+            Ended: ILL_POSED for a contact that should rise by more than `least` (b, m): no push can make it.
         """
         free = (H * np.linalg.solve(M, H.swapaxes(1, 2)).swapaxes(1, 2)).sum(axis=-1)
         idle = np.diagonal(G, axis1=1, axis2=2) <= HELD * free
         for b, k in np.argwhere(idle).tolist():
-            if rows[k] not in self.normal:
+            if rows[k] not in self.normal and bare[b, k] > least[b, k]:
                 raise Ended(Outcome.ILL_POSED, [rows[k]])
             G[b, k], G[b, :, k], bare[b, k] = 0.0, 0.0, 0.0
 

@@ -167,7 +167,9 @@ def test_loops_of_a_robot_move_alike_in_another_solver() -> None:
 
 def test_a_start_that_does_not_assemble_is_refused_with_the_nearest() -> None:
     case = robot("agility_cassie/cassie")
-    with pytest.raises(SceneError, match=r"off 'loop0 x', which is always on.*--set assemble=1 .* moves '.*' by 0\.0"):
+    with pytest.raises(
+        SceneError, match=r"off 'loop0 x', which is always on.*--set assemble=1 .* changes '.*' by 0\.0"
+    ):
         engines.load("reference").prepare(case, "compiled")
 
 

@@ -237,6 +237,9 @@ def test_the_second_machine_moves_bodies_in_loops_alike(seed: int) -> None:
     assert one.outcome is other.outcome
     if one.outcome is Outcome.FINISHED:
         assert np.abs(one.q - other.q).max() < 1e-8
+        known = ~np.isnan(one.lam) & ~np.isnan(other.lam)
+        assert known.any()
+        assert np.abs(one.lam - other.lam)[known].max() < 1e-4 * np.abs(one.lam[known]).max()
         events = switches(one, 0), switches(other, 0)
         assert [event[1:] for event in events[0]] == [event[1:] for event in events[1]]
         assert np.allclose([event[0] for event in events[0]], [event[0] for event in events[1]], rtol=0.0, atol=1e-7)
