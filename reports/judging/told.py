@@ -12,8 +12,8 @@ from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
-FOLLOWED = re.compile(r"Followed to .*?: (.*?)\.(?: |$)")
-"""What the row of a truth says of a horizon that is shorter than was asked for."""
+SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$)")
+"""What the row of a truth says of a horizon that is shorter than was asked for, or a motion that is known in part."""
 NAMED = 3
 """Runs that the sentence names."""
 
@@ -106,7 +106,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
 
 
 def _part(row: Row) -> str:
-    short = FOLLOWED.search(row["why"])
+    short = SHORT.search(row["why"])
     return f"{row['compared']:.2g} of the horizon" + (f" ({short[1]})" if short else "")
 
 

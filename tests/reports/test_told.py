@@ -72,3 +72,16 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
             assert f"{who} on ball:hard (position {times[who] * 1e-3:.2g}, {times[who]:.2g} times its limit" in text
     assert named(text, "Without a limit:") == (by["unlimited"][:NAMED], max(len(by["unlimited"]) - NAMED, 0))
     assert ("0.31 of the horizon" in text) == (truth["compared"] < 1.0)
+
+
+@pytest.mark.parametrize(
+    ("why", "said"),
+    [
+        ("Known up to 0.2 s: more than one set keeps the law. Compiled.", " (more than one set keeps the law)"),
+        ("Compiled. Followed to 0.39 s of 1 s: more takes longer.", " (more takes longer)"),
+        ("Compiled at 1e-12 agrees.", ""),
+    ],
+)
+def test_the_sentence_says_why_a_truth_is_known_in_part(why: str, said: str) -> None:
+    rows = [row("fake:one", Word.WITHIN), row("truth:", Word.WITHIN, "truth", why=why, compared=0.2)]
+    assert f"ball:hard, 0.2 of the horizon{said}." in sentence(runs_of(rows))
