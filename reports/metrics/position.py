@@ -35,8 +35,9 @@ def where(truth: Truth, run: Trajectory, case: Case) -> str:
     """Say which coordinate the number is of, how far it is off in its own unit, and when."""
     off, t = _errors(truth, run, case)
     i, j = np.unravel_index(np.argmax(off / scale_of(truth.trajectory, case)), off.shape)
-    unit = "rad" if j in case.quaternions else case.coordinates[j].unit
-    name = case.coordinates[j].name.removesuffix(" qw") if j in case.quaternions else case.coordinates[j].name
+    name, unit = case.coordinates[j].name, case.coordinates[j].unit
+    if j in case.quaternions:  # the angle of all four
+        name, unit = name.removesuffix(" qw"), "rad"
     return f"{name} by {off[i, j]:.2g} {unit} at {t[i]:.3g} s"
 
 

@@ -99,7 +99,8 @@ def _save_traces(out: Path, traces: Sequence[Trace]) -> None:
 
 def write_table(stem: Path, rows: pd.DataFrame, provenance: Mapping[str, Any]) -> None:
     """One table as Parquet (provenance in its metadata), CSV and JSON (provenance beside the rows)."""
-    rows.to_csv(stem.with_suffix(".csv"), index=False, quoting=_quoting(rows.to_numpy().ravel()))
+    texts = rows.select_dtypes(exclude=["number", "bool"])
+    rows.to_csv(stem.with_suffix(".csv"), index=False, quoting=_quoting(texts.to_numpy().ravel()))
     plain = json.loads(rows.to_json(orient="records", double_precision=15))
     _write_both(stem, pa.Table.from_pandas(rows, preserve_index=False), plain, provenance)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -160,3 +161,46 @@ class Body:
                 elif len(done.t_events[2 * i + 1]) and self.mode[i] == STICK:
                     self.mode[i] = RIGHT if self.solved(y[:3], y[3:], self.mode)[2][i] < 0.0 else LEFT
         return y[:3], y[3:], log
+
+
+def tossed_rod(seed: int) -> tuple[tuple[float, float, float, float], np.ndarray, np.ndarray, float, Any]:
+    """Return a rod that is tossed onto a floor, and how a second machine moves it.
+
+    Returns:
+        (mu, half its length, radius of its ends, a1), its start (x, z, angle) and velocities, the horizon in s, and of
+        the second machine positions and velocities at the end and the log of its modes.
+    """
+    rng = np.random.default_rng(seed)
+    mu, half, radius, a1 = rng.uniform(0.1, 0.8), 0.5, 0.05, float(rng.choice([20.0, 100.0, 200.0]))
+    th = rng.uniform(-3.0, 3.0)
+    q0 = np.array([0.0, abs(half * np.cos(th)) + radius + rng.uniform(0.01, 0.1), th])
+    v0 = rng.normal(size=3) * [1.5, 1.0, 3.0]
+    other = Body(1.0, half**2 / 3, np.array([[0, -half], [0, half]]), np.full(2, radius), 1e4, a1, mu)
+    q, v, log = other.run(q0, v0, 0.35)
+    assert all(modes.count(STICK) < 2 for _, modes in log)  # two that stick share a load in many ways
+    return (mu, half, radius, a1), q0, v0, 0.35, (q, v, log)
+
+
+def consistent(
+    H: np.ndarray, force: np.ndarray, mu: float, k: int, loops: np.ndarray | None = None
+) -> list[np.ndarray]:
+    """Return accelerations of every set of modes (off, sticks, slips to either side) that agrees with its forces.
+
+    By whole equations with those of loops. Sets that jam are left out.
+    """
+    found, E = [], np.zeros((0, len(force))) if loops is None else loops
+    for modes in product("FTPM", repeat=k):
+        on, held = [i for i in range(k) if modes[i] != "F"], [k + i for i in range(k) if modes[i] == "T"]
+        sign = {"P": mu, "M": -mu}
+        R = np.vstack([H[on + held], E])
+        C = np.array([*(H[i] - sign.get(modes[i], 0.0) * H[k + i] for i in on), *H[held], *E]).reshape(R.shape)
+        if not np.linalg.det(R @ C.T) > 0.0:  # they jam
+            continue
+        x = np.linalg.solve(R @ C.T, -R @ force)
+        a = force + C.T @ x
+        normal, along = dict(zip(on, x, strict=False)), dict(zip(held, x[len(on) :], strict=False))
+        good = all(H[i] @ a >= -1e-9 for i in range(k) if modes[i] == "F") and all(f >= -1e-9 for f in normal.values())
+        good = good and all(abs(f) <= mu * normal[i - k] + 1e-9 for i, f in along.items())
+        if good and all(np.sign(sign[modes[i]]) * (H[k + i] @ a) >= -1e-9 for i in range(k) if modes[i] in "PM"):
+            found.append(a)
+    return found

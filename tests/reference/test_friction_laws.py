@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from friction_oracle import STICK, Body
+from friction_oracle import consistent, tossed_rod
 from friction_scenes import (
     EDGED,
     HEAVIEST,
@@ -85,38 +85,13 @@ def obeys(scene: Scene, run_: Trajectory, mu: float, rtol: float) -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 6, 8])
 def test_a_second_machine_moves_a_tossed_rod_alike(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    mu, half, radius, a1 = rng.uniform(0.1, 0.8), 0.5, 0.05, float(rng.choice([20.0, 100.0, 200.0]))
-    th = rng.uniform(-3.0, 3.0)
-    q0 = np.array([0.0, abs(half * np.cos(th)) + radius + rng.uniform(0.01, 0.1), th])
-    v0 = rng.normal(size=3) * [1.5, 1.0, 3.0]
-    other = Body(1.0, half**2 / 3, np.array([[0, -half], [0, half]]), np.full(2, radius), 1e4, a1, mu)
-    q, v, log = other.run(q0, v0, 0.35)
-    assert all(modes.count(STICK) < 2 for _, modes in log)  # two that stick share a load in many ways
+    (mu, half, radius, a1), q0, v0, t_end, (q, v, log) = tossed_rod(seed)
     scene = rod_on_floor(mu, length=half, radius=radius, law=RowLaw(a0=1e4, a1=a1))
-    found = run(scene, q0, v0, 0.35, rtol=1e-10)
+    found = run(scene, q0, v0, t_end, rtol=1e-10)
     assert np.abs(found.q[-1] - q).max() < 1e-9
     assert np.abs(found.v[-1] - v).max() < 1e-7
     times = np.array([e.t for e in found.events])
     assert all(np.abs(times - t).min() < 1e-9 for t, _ in log[1:])
-
-
-def consistent(H: np.ndarray, force: np.ndarray, mu: float, k: int) -> list[np.ndarray]:
-    """Accelerations of every set of modes that agrees with its forces: OFF, STICK, SLIP to either side."""
-    found = []
-    for modes in product("FTPM", repeat=k):
-        on, held = [i for i in range(k) if modes[i] != "F"], [k + i for i in range(k) if modes[i] == "T"]
-        sign = {"P": mu, "M": -mu}
-        R = H[on + held]
-        C = np.array([H[i] - sign.get(modes[i], 0.0) * H[k + i] for i in on] + [H[i] for i in held]).reshape(R.shape)
-        x = np.linalg.solve(R @ C.T, -R @ force) if on else np.zeros(0)
-        a = force + C.T @ x
-        normal, along = dict(zip(on, x, strict=False)), dict(zip(held, x[len(on) :], strict=True))
-        good = all(H[i] @ a >= -1e-9 for i in range(k) if modes[i] == "F") and all(f >= -1e-9 for f in normal.values())
-        good = good and all(abs(f) <= mu * normal[i - k] + 1e-9 for i, f in along.items())
-        if good and all(np.sign(sign[modes[i]]) * (H[k + i] @ a) >= -1e-9 for i in range(k) if modes[i] in "PM"):
-            found.append(a)
-    return found
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -2,35 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pytest
+from friction_oracle import consistent
 from friction_scenes import G, linear, random_problem
 
 from crossbody.cases import Mode, Outcome
 from crossbody.reference import System, simulate
 from crossbody.reference.linear import linearise, sensitivity
-
-
-def consistent(H: np.ndarray, E: np.ndarray, force: np.ndarray, mu: float, k: int) -> list[np.ndarray]:
-    """Accelerations of every set of modes that agrees with its forces, by whole equations with those of loops."""
-    found = []
-    for modes in product("FTPM", repeat=k):
-        on, held = [i for i in range(k) if modes[i] != "F"], [k + i for i in range(k) if modes[i] == "T"]
-        sign = {"P": mu, "M": -mu}
-        R = np.vstack([H[on + held], E])
-        C = np.vstack([*(H[i] - sign.get(modes[i], 0.0) * H[k + i] for i in on), *(H[i] for i in held), *E])
-        if not np.linalg.det(R @ C.T) > 0.0:  # they jam
-            continue
-        x = np.linalg.solve(R @ C.T, -R @ force)
-        a = force + C.T @ x
-        normal, along = dict(zip(on, x, strict=False)), dict(zip(held, x[len(on) :], strict=False))
-        good = all(H[i] @ a >= -1e-9 for i in range(k) if modes[i] == "F") and all(f >= -1e-9 for f in normal.values())
-        good = good and all(abs(f) <= mu * normal[i - k] + 1e-9 for i, f in along.items())
-        if good and all(np.sign(sign[modes[i]]) * (H[k + i] @ a) >= -1e-9 for i in range(k) if modes[i] in "PM"):
-            found.append(a)
-    return found
 
 
 @pytest.mark.parametrize("seed", [pytest.param(s, marks=() if s < 10 else pytest.mark.slow) for s in range(60)])
@@ -42,7 +21,7 @@ def test_modes_beside_loops_are_a_set_that_agrees_with_its_forces(seed: int) -> 
         n = len(force) + l
         H, force = np.hstack([H, 0.5 * rng.normal(size=(2 * k, l))]), np.r_[force, rng.normal(size=l)]
         E = rng.normal(size=(l, n)) * 0.6
-        sets = consistent(H, E, force, mu, k)
+        sets = consistent(H, force, mu, k, E)
         run = simulate(linear(H, force, mu, k, loops=E), np.zeros(n), np.zeros(n), 1e-6, rtol=1e-6, max_steps=3)
         if run.outcome is Outcome.PAINLEVE:
             continue
