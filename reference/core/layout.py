@@ -35,7 +35,8 @@ OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
     "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among", "seen",
     "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by",
-    "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
+    "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn", "borne",
+    "even", "known", "off_by",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -311,6 +312,7 @@ class Work:
     kept_way: Floats
     kept_other: Floats
     kept_excess: Floats
+    borne: Floats  # (nc,) by place: multipliers on the way to those of a set
     along: Floats  # (nc,) by place: direction of slip
     slides: Bytes  # rows of contacts that slide
     off: Bytes  # rows that are left out while modes are decided
@@ -339,7 +341,10 @@ class Work:
     held: Floats2  # what couples both
     square: Floats2  # scratch
     weight: Floats
+    even: Floats
     found: Floats
+    known: Floats
+    off_by: Floats
     beside: Floats
     left: Floats
     press: Floats

@@ -49,12 +49,12 @@ def factor_in_turn(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def solve_in_turn(s: Any, m: Model, w: Work) -> None:
-    """Solve for w.found the normal rows, and in their null space the sticking ones, by loads that suit these."""
+def _start(s: Any, w: Work) -> None:
+    """Leave in w.press what the normal rows alone ask for by w.found, and in w.left what the sticking ones do then."""
     count, sticking = s.normals, s.unknowns - s.normals
     for a in range(count):
-        w.weight[a] = 1.0
-    solve_complete(w.first, count, s.rank_first, w.down, w.across, w.weight, w.square, w.beside, w.found)
+        w.even[a] = 1.0
+    solve_complete(w.first, count, s.rank_first, w.down, w.across, w.even, w.square, w.beside, w.found)
     for a in range(sticking):
         value = w.found[count + a]
         for c in range(count):
@@ -62,9 +62,26 @@ def solve_in_turn(s: Any, m: Model, w: Work) -> None:
         w.left[a] = value
     for a in range(count):
         w.press[a] = w.found[a]
-    for _ in range(SHARINGS if s.rank_second < sticking else 1):
+
+
+@compiled
+def solve_in_turn(s: Any, m: Model, w: Work) -> None:
+    """Solve for w.found the normal rows, and in their null space the sticking ones, by loads that suit these."""
+    _start(s, w)
+    for _ in range(SHARINGS if s.rank_second < s.unknowns - s.normals else 1):
         _weigh(s, m, w)
         _share(s, w)
+
+
+@compiled
+def refine(s: Any, w: Work) -> None:
+    """Add to w.found what w.off_by, by which rows are off under it, asks for in loads that are shared as they were."""
+    for a in range(s.unknowns):
+        w.known[a], w.found[a] = w.found[a], w.off_by[a]
+    _start(s, w)
+    _share(s, w)
+    for a in range(s.unknowns):
+        w.found[a] += w.known[a]
 
 
 @compiled

@@ -8,7 +8,8 @@ how much faster than its law every row moves, a set of modes is consistent if
     off     a_n >= 0                    and lam_n >= 0 of both others
 
 One change at a time, of what is violated most, finds most of them. Where that comes back to a set it goes on from what
-60 sweeps of projected Gauss-Seidel give, and at last through the sets that differ from that in few contacts.
+60 sweeps of projected Gauss-Seidel give, then on a way that all can bear (`mode_path`), and at last through the sets
+that differ from that in few contacts.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ TURNS = 40  # of directions of slip towards those of acceleration
 TURNED = 1e-12
 MOST_SETS = 256
 BELOW = 1e-6  # part of its bound by which a force stays below it to count as that of a contact that sticks
+BACKWARDS = 8  # beside a mode: it slides against the direction of its row
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 
 
@@ -64,7 +66,7 @@ def _worst(s: Any, m: Model, w: Work) -> int:
 
 
 @compiled
-def _change(m: Model, w: Work, i: int, becomes: int) -> None:
+def change(m: Model, w: Work, i: int, becomes: int) -> None:
     """Put contact i in another mode; one that begins to slide does so against the force that held it."""
     if becomes == SLIP and w.stands[i]:
         size = size_along(m, w, i, w.la)
@@ -74,18 +76,28 @@ def _change(m: Model, w: Work, i: int, becomes: int) -> None:
 
 
 @compiled
+def _kind(m: Model, w: Work, i: int) -> int:
+    """A number for the mode of contact i: of one that slides along a single row its way as well.
+
+    Along two rows the way is turned until it agrees with where it leads, and the mode alone says which.
+    """
+    backwards = w.state[i] == SLIP and m.tangents[i] == 1 and w.way[m.tangent[i]] < 0.0
+    return int(w.state[i] + (BACKWARDS if backwards else 0))
+
+
+@compiled
 def _seen(s: Any, m: Model, w: Work) -> bool:
     """Whether the set stood before since s.sets was set to 0; note it."""
     for r in range(s.sets):
         same = True
         for i in range(s.nc):
-            same = same and w.sets[r, i] == w.state[i]
+            same = same and w.sets[r, i] == _kind(m, w, i)
         if same:
             return True
     if s.sets == len(w.sets):
         return True
     for i in range(s.nc):
-        w.sets[s.sets, i] = w.state[i]
+        w.sets[s.sets, i] = _kind(m, w, i)
     s.sets += 1
     return False
 
@@ -121,7 +133,7 @@ def iterate(s: Any, m: Model, w: Work, together: int) -> bool:
         for j in range(s.na):
             k = w.idx[j]
             if has_friction(m, k) and (k == i or together == ALL) and w.wants[k] != w.state[k]:
-                _change(m, w, k, w.wants[k])
+                change(m, w, k, w.wants[k])
     return False
 
 
@@ -148,7 +160,7 @@ def aim(m: Model, w: Work, i: int) -> None:
 
 
 @compiled
-def _sweep(s: Any, m: Model, w: Work) -> None:
+def sweep(s: Any, m: Model, w: Work) -> None:
     """Projected Gauss-Seidel from no forces; put every contact in the mode that its force then has."""
     for j in range(s.na):
         w.la[j] = 0.0
@@ -187,7 +199,7 @@ def _sweep(s: Any, m: Model, w: Work) -> None:
 @compiled
 def swept(s: Any, m: Model, w: Work, together: int) -> bool:
     """Whether a consistent set is found from what sweeps give."""
-    _sweep(s, m, w)
+    sweep(s, m, w)
     return bool(iterate(s, m, w, together))
 
 
@@ -223,7 +235,7 @@ def start_digit(state: int) -> int:
 @compiled
 def near_sets(s: Any, m: Model, w: Work) -> bool:
     """Try sets by the number of contacts in which they differ from the present one; whether one is consistent."""
-    _sweep(s, m, w)
+    sweep(s, m, w)
     keep(s, w)
     contacts = 0
     for j in range(s.na):

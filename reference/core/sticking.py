@@ -10,6 +10,7 @@ from crossbody.reference.core.friction import count_from_none, decided_to, has_f
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loops import is_idle
+from crossbody.reference.core.mode_path import approached
 from crossbody.reference.core.mode_search import ALL, WORST, aim, iterate, judge, near_sets, swept, vary
 from crossbody.reference.core.mode_set import (
     DIFFERENT,
@@ -120,7 +121,10 @@ def _hold_what_stands(s: Any, m: Model, w: Work) -> None:
 def _found(s: Any, m: Model, w: Work) -> bool:
     """Whether a consistent set is found, contacts as they are tried first."""
     put_as_they_are(s, m, w)
-    return bool(iterate(s, m, w, ALL) or swept(s, m, w, ALL) or swept(s, m, w, WORST) or near_sets(s, m, w))
+    return bool(
+        iterate(s, m, w, ALL) or swept(s, m, w, ALL) or swept(s, m, w, WORST)
+        or approached(s, m, w) or near_sets(s, m, w)
+    )  # fmt: skip
 
 
 @compiled

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from friction_scenes import G, _dynamics, _energy, _gaps, _rows, account, box_body, rubbed_tree, run
+from scipy.optimize import lsq_linear
 
 from crossbody import cases, engines
 from crossbody.cases import Mode, Outcome, SceneError, Trajectory
@@ -310,3 +311,23 @@ def test_rows_that_cannot_rub_by_themselves_are_refused(given: dict[str, Any]) -
 def test_without_dry_friction_there_are_no_rows() -> None:
     assert case_of(swing(0.0)).contacts == ()
     assert replace(swing(1.0), joints=swing(0.0).joints).dry == ()
+
+
+@pytest.mark.parametrize("seed", [pytest.param(s, marks=() if s < 12 else pytest.mark.slow) for s in range(80)])
+def test_rows_that_nearly_depend_on_each_other_rub_as_the_least_of_a_convex_function_says(seed: int) -> None:
+    """Of unit masses at rest v' is the least |f + H^T lam| over all |lam| <= bound: SciPy finds it by another way."""
+    rng = np.random.default_rng(seed)
+    for _ in range(20):
+        n, rows = int(rng.integers(2, 9)), int(rng.integers(4, 15))
+        base = rng.normal(size=(min(n, rows), n))
+        mixed = rng.normal(size=(rows - len(base), len(base))) @ base
+        H = np.vstack([base, mixed + 10.0 ** -rng.uniform(1.0, 5.0) * rng.normal(size=mixed.shape)])
+        force, bound = 3.0 * rng.normal(size=n), rng.uniform(0.1, 2.0, size=rows)
+        exact = force + H.T @ lsq_linear(H.T, -force, (-bound, bound), method="bvls", tol=1e-14, max_iter=1000).x
+        system_ = System(
+            n=n, dynamics=_dynamics, gaps=_gaps, rows=_rows, energy=_energy, friction_loss=bound,
+            parameters=[0.0, *force, *np.zeros(n), *H.ravel(), rows], a0=[0.0] * rows, a1=[200.0] * rows,
+        )  # fmt: skip
+        run_ = simulate(system_, np.zeros(n), np.zeros(n), 1e-6, rtol=1e-6, max_steps=3)
+        assert run_.outcome is not Outcome.NO_CONSISTENT_MODES, run_.message
+        assert run_.v[-1] / run_.t[-1] == pytest.approx(exact, abs=1e-5 * np.abs(force).max())
