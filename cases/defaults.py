@@ -58,7 +58,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     if case.rubs:
         yield "stick_times", 1e-6, _TOLERANCE
         yield "slip_times", 1e-6, _TOLERANCE
-        yield "cone_violation", 1e-9, "friction is at most mu times the normal force: rounding"
+        yield "cone_violation", 1e-6, "friction is at most mu times the normal force, to what rows that stick are off"
         yield "friction_angle", 1e-6, "friction is against the slip, to the precision of its direction"
     if (~case.law.unilateral & (case.law.a0 > 0.0)).any():
         yield "constraint_drift", 1e-8, "the law draws closures back at its own rate"

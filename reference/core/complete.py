@@ -12,7 +12,7 @@ RANK = 1e-10  # part of a contact's own size below which a pivot is that of a ro
 
 
 @compiled
-def factor_complete(A: Floats, rows: int, columns: int, down: Index, across: Index) -> int:
+def factor_complete(A: Floats, rows: int, columns: int, down: Index, across: Index, most: int) -> int:
     """LU factors with complete pivoting, in place; how many pivots are above RANK of the size 1 that rows have.
 
     Args:
@@ -21,12 +21,13 @@ def factor_complete(A: Floats, rows: int, columns: int, down: Index, across: Ind
         columns: how many it has.
         down: which row stands where.
         across: which column stands where.
+        most: pivots that are taken.
     """
     for a in range(rows):
         down[a] = a
     for b in range(columns):
         across[b] = b
-    for c in range(min(rows, columns)):
+    for c in range(min(rows, columns, most)):
         best, most_a, most_b = RANK, -1, -1
         for a in range(c, rows):
             for b in range(c, columns):
@@ -47,7 +48,17 @@ def factor_complete(A: Floats, rows: int, columns: int, down: Index, across: Ind
                 A[a, c] /= A[c, c]
                 for b in range(c + 1, columns):
                     A[a, b] -= A[a, c] * A[c, b]
-    return min(rows, columns)
+    return min(rows, columns, most)
+
+
+@compiled
+def largest_left(A: Floats, rank: int, n: int) -> float:
+    """Return the largest pivot that could be taken next of n rows, of which `factor_complete` has taken `rank`."""
+    largest = 0.0
+    for a in range(rank, n):
+        for b in range(rank, n):
+            largest = max(largest, abs(A[a, b]))
+    return largest
 
 
 @compiled

@@ -32,7 +32,7 @@ def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i) and not w.slides[i]:
-            out[i] = margin(m, w, i, w.la)
+            out[i] = margin(s, m, w, i)
     value, known = 0.0, False
     for j in range(s.na):
         i = w.idx[j]
@@ -65,6 +65,13 @@ def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
 
 
 @compiled
-def margin(m: Model, w: Work, i: int, la: Array) -> float:
-    """By how much friction of contact i is below its bound, from the multipliers of the rows in contact."""
-    return float(_within_bound(m, i, la, w.listed[i], w.listed[m.tangent[i]]))
+def within_bound(m: Model, w: Work, i: int) -> float:
+    """By how much friction of contact i is below its bound, from the multipliers in w.la."""
+    return float(_within_bound(m, i, w.la, w.listed[i], w.listed[m.tangent[i]]))
+
+
+@compiled
+def margin(s: Any, m: Model, w: Work, i: int) -> float:
+    """How far contact i is from what ends its sticking as it does: its bound, or that rows depend on each other."""
+    until_apart = bound(m, i, w.la[w.listed[i]]) * (1.0 - s.growth)
+    return float(min(within_bound(m, w, i), until_apart) if s.held_dependent > 0 else within_bound(m, w, i))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.complete import factor_complete, solve_complete
+from crossbody.reference.core.complete import factor_complete, largest_left, solve_complete
 from crossbody.reference.core.directions import take_directions
 from crossbody.reference.core.friction import has_friction, is_dry
 from crossbody.reference.core.layout import Model, Work
@@ -17,6 +17,8 @@ from crossbody.reference.core.unknowns import fill, list_unknowns
 from crossbody.reference.kinds import Array
 
 REFINEMENTS = 2  # of multipliers of rows that depend on each other
+GROWN = 1e-8  # pivot from which on a row does not depend on others that did
+FURTHER = 10.0  # and at least so many times what it was
 
 
 @compiled
@@ -40,7 +42,7 @@ def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
     if s.loops and eliminate(s, m, w) != 0:
         return 1
     take_directions(s, m, w, turning)
-    factor_set(s, m, w)
+    _factor_as_held(s, m, w)
     return int(s.rank == 0 and s.unknowns > 0)
 
 
@@ -49,10 +51,37 @@ def factor_set(s: Any, m: Model, w: Work) -> None:
     """Factor A of the rows that are not off, from w.gram, w.slides and w.along."""
     s.normals = list_unknowns(s, m, w)
     fill(s, m, w)
-    s.rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across)
+    s.rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across, s.unknowns)
     s.dependent_rows = s.unknowns - s.rank
     if s.dependent_rows > 0:
-        factor_in_turn(s, m, w)
+        factor_in_turn(s, m, w, s.unknowns, s.unknowns)
+
+
+@compiled
+def _factor_as_held(s: Any, m: Model, w: Work) -> None:
+    """Factor A; rows that depended on others when modes were decided do so until they are decided anew.
+
+    Near there rounding says whether they do, and what they bear is nothing like what they bear where they do not.
+    s.growth says how far they are from what calls for a new decision, 1 where that is.
+    """
+    s.normals = list_unknowns(s, m, w)
+    if s.held_unknowns != s.unknowns or s.held_dependent == 0:
+        factor_set(s, m, w)
+        s.held_unknowns, s.held_dependent, s.growth = s.unknowns, s.dependent_rows, 0.0
+        s.held_first, s.held_second = s.rank_first, s.rank_second
+        s.grown = max(GROWN, FURTHER * _left(s, w)) if s.dependent_rows > 0 else GROWN
+        return
+    fill(s, m, w)
+    s.rank, s.dependent_rows = s.unknowns - s.held_dependent, s.held_dependent
+    factor_in_turn(s, m, w, s.held_first, s.held_second)
+    s.growth = _left(s, w) / s.grown
+
+
+@compiled
+def _left(s: Any, w: Work) -> float:
+    """The largest pivot of a row that depends on others."""
+    first = largest_left(w.first, s.rank_first, s.normals)
+    return float(max(first, largest_left(w.second, s.rank_second, s.unknowns - s.normals)))
 
 
 @compiled

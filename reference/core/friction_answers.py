@@ -80,7 +80,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         return float(jams.determinant(s, m, w, w.listed[i]))
     elif what == MARGIN:
         cones.without_pull(s, m, w)
-        return float(cones.margin(m, w, i, w.la))
+        return float(cones.margin(s, m, w, i))
     elif what == WATCH:
         cones.watch_friction(s, m, w, w.cones[i])
     elif what == TURNING_RATE:

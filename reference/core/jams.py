@@ -111,7 +111,7 @@ def determinant(s: Any, m: Model, w: Work, j: int) -> float:
             w.first[a, b] = 0.0
             for c in range(count):
                 w.first[a, b] += w.held[a, c] * w.second[c, b]
-    if factor_complete(w.first, rank, rank, w.down, w.across) < rank:
+    if factor_complete(w.first, rank, rank, w.down, w.across, rank) < rank:
         return -JAMMED
     w.seen[:] = 0
     return _signed_product(w.first, rank, w.down, w.across, w.seen) - JAMMED

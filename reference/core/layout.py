@@ -141,6 +141,12 @@ STATE = np.dtype(
         ("closed", "i8"),  # rows of loops that were eliminated before
         ("rank_first", "i8"),
         ("rank_second", "i8"),
+        ("held_unknowns", "i8"),  # the same when modes were decided: which rows depend on others stays
+        ("held_dependent", "i8"),
+        ("held_first", "i8"),
+        ("held_second", "i8"),
+        ("grown", "f8"),  # the pivot at which that is decided anew,
+        ("growth", "f8"),  # and what part of it the largest one is
         ("sets", "i8"),  # of modes that were tried
         ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters,
         ("determined_until", "f8"),  # s: from then on

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.cones import without_pull
+from crossbody.reference.core.cones import within_bound, without_pull
 from crossbody.reference.core.friction import count_from_none, decided_to, has_friction, is_dry, slip
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
@@ -36,7 +36,7 @@ def begin_slip(s: Any, m: Model, w: Work) -> None:
     """Let contacts that have reached their bounds begin to slide against the forces that held them, as evaluated."""
     without_pull(s, m, w)
     for i in range(s.nc):
-        if w.hit[i] <= s.theta and w.kind[i] == CONE:
+        if w.hit[i] <= s.theta and w.kind[i] == CONE and not (s.growth >= 1.0 and within_bound(m, w, i) > 0.0):
             w.begins[i] = 1
             size = size_along(m, w, i, w.la)
             for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
@@ -169,7 +169,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
         0, or NO_CONSISTENT_MODES or PAINLEVE; with one of these w.wants marks contacts.
     """
     note_speed(s, m, w, w.rate)
-    s.leeway = 0.0
+    s.leeway, s.held_unknowns = 0.0, -1
     look(s, m, w)
     if not _found(s, m, w):
         s.leeway = max(_most_pull(s, m, w), decided_to(s))

@@ -120,7 +120,7 @@ def _take_shares(s: Any, m: Model, w: Work) -> None:
     w.open_rate[:] = 0.0
     if s.na > 0 and s.dependent_rows > 0:
         fill(s, m, w)
-        rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across)
+        rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across, s.unknowns)
         for k in range(rank, s.unknowns):
             _change_nothing(s, m, w, rank, k)
             if _move(s, w):

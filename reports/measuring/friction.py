@@ -47,6 +47,8 @@ class Rubbing:
 
 SLOW = 1e-3
 """Part of the largest slip, and of the largest force, below which a direction is not looked at."""
+SHORT = 1e-6
+"""m, or rad, to which positions are judged: a slide is not known to be one if it is shorter."""
 
 
 @remembered(4)  # every metric asks for the same
@@ -104,14 +106,36 @@ def cumulated(run: Trajectory, values: Floats) -> Floats:
 def changes(run: Trajectory, found: Rubbing) -> Iterator[tuple[float, bool]]:
     """Yield when a pair begins to slide, and when all of its places that touch hold: instant, and whether it slides.
 
-    What it did when it touched last counts where it comes off in between.
+    What it did when it touched last counts where it comes off in between. A slide shorter than SHORT is none.
     """
     for pair in np.unique(found.pair):
-        mode = dict.fromkeys(found.rows[found.pair == pair].tolist(), Mode.FREE)
-        slid: bool | None = None
-        for t, events in groupby((e for e in run.events if e.contact in mode), key=lambda event: event.t):
-            mode |= {event.contact: event.after for event in events}
-            slides = Mode.SLIP in mode.values()
-            if slid is not None and slid != slides and (slides or Mode.STICK in mode.values()):
-                yield t, slides
-            slid = slides if slides or Mode.STICK in mode.values() else slid
+        places = np.flatnonzero(found.pair == pair)
+        begun = float(run.t[0]) if len(run.t) else 0.0
+        pending: list[tuple[float, bool]] = []
+        for t, slides in _switches(run, found.rows[places].tolist()):
+            if slides:
+                begun, pending = t, [(t, True)]
+            elif _way(run, found, places, begun, t) > SHORT:
+                yield from (*pending, (t, False))
+                pending = []
+        if pending and _way(run, found, places, begun, float(run.t[-1])) > SHORT:
+            yield from pending
+
+
+def _switches(run: Trajectory, rows: list[int]) -> Iterator[tuple[float, bool]]:
+    """Yield when rows of a pair begin to slide, and when all of them that touch hold."""
+    mode = dict.fromkeys(rows, Mode.FREE)
+    slid: bool | None = None
+    for t, events in groupby((e for e in run.events if e.contact in mode), key=lambda event: event.t):
+        mode |= {event.contact: event.after for event in events}
+        slides = Mode.SLIP in mode.values()
+        if slid is not None and slid != slides and (slides or Mode.STICK in mode.values()):
+            yield t, slides
+        slid = slides if slides or Mode.STICK in mode.values() else slid
+
+
+def _way(run: Trajectory, found: Rubbing, places: NDArray[np.intp], start: float, end: float) -> float:
+    """Return how far any of some places slips from one instant to another, m, of joints rad."""
+    inside = (run.t >= start) & (run.t <= end)
+    speed = np.linalg.norm(found.slip[inside][:, places], axis=-1)
+    return float(np.max(np.trapezoid(speed, run.t[inside], axis=0), initial=0.0))
