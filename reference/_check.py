@@ -175,7 +175,10 @@ def _check_rows(at: State, draw: Any) -> None:
     _compare(at, "rows", "h", at.h, "gaps' h", at.gap, np.where(there, EXACT * (np.abs(at.gap) + reach), np.inf))
     held = (np.asarray(s.follows) < 0) & there
     d = (1.0 + at.sizes()) * draw.standard_normal(s.n)
-    wrong = held & differs(lambda x: at.gaps(x, v)[0], q, s.displacement(q, d, at.p), at.H @ d, H @ np.abs(d), reach)
+    way = s.displacement(q, d, at.p)
+    wrong = held & differs(
+        lambda x: at.gaps(x, v)[0], q, way, at.H @ d, H @ np.abs(d), reach, lambda x: at.rows(x, v)[0] @ d
+    )
     if np.any(wrong):
         _name_gradient(at, int(np.flatnonzero(wrong)[0]))
     size = H @ np.abs(v) + np.abs(at.rate)
@@ -186,7 +189,7 @@ def _check_rows(at: State, draw: Any) -> None:
         return at.rows(x, v)[0] @ v
 
     rates = s.rates(q, v, at.t, at.p)
-    wrong = there & differs(turned, q, rates, at.Hdv, np.abs(at.Hdv), reach)
+    wrong = there & differs(turned, q, rates, at.Hdv, np.abs(at.Hdv), reach, lambda x: at.rows(x, v)[2])
     if np.any(wrong):
         i = int(np.flatnonzero(wrong)[0])
         slope = closest(turned, q, rates, at.Hdv)[i]

@@ -17,8 +17,9 @@ AGREE = 1e-6  # part of the terms by which a difference may be off, beside what 
 
 
 def differs(
-    function: Callable[[Floats], Floats], q: Floats, d: Floats, claimed: Floats, terms: Floats, size: Floats
-) -> NDArray[np.bool_]:
+    function: Callable[[Floats], Floats], q: Floats, d: Floats, claimed: Floats, terms: Floats, size: Floats,
+    slopes: Callable[[Floats], Floats] | None = None,
+) -> NDArray[np.bool_]:  # fmt: skip
     """Whether no difference of a function (m,) of q along d admits what is claimed for its derivative.
 
     Args:
@@ -28,6 +29,8 @@ def differs(
         claimed: derivatives (m,) along it.
         terms: sizes (m,) of the terms that the derivatives are made of.
         size: those of the function itself.
+        slopes: what is claimed (m,) at other positions. A kink nearer than the least width shows in it: no difference
+            admits what is right there, but one lies between what is claimed on both sides.
     """
     here, wrong, last = function(q), np.ones(len(claimed), dtype=bool), None
     for width in WIDTHS:
@@ -38,6 +41,9 @@ def differs(
         spread = np.zeros(len(claimed)) if last is None else np.minimum(np.abs(middle - last), AGREE**0.5 * terms)
         wrong &= ~(np.abs(middle - claimed) <= bound + spread)
         if width == WIDTHS[-1]:
+            if slopes is not None and np.any(wrong):
+                sides = np.array([slopes(q - width * d), claimed, slopes(q + width * d)])
+                wrong &= ~((sides.min(axis=0) - bound <= middle) & (middle <= sides.max(axis=0) + bound))
             jump = np.abs(2.0 * here - ahead - behind) / width
             kinked = jump > AGREE * (terms + np.abs(middle)) + noise
             for side in ((ahead - here) / width, (here - behind) / width):

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from crossbody.cases.errors import InvalidValue
 
-ALL = ("friction", "contacts", "medium", "meshes", "overlaps", "limits", "actuators", "loops", "tendons")
+ALL = ("friction", "rolling", "contacts", "medium", "meshes", "overlaps", "limits", "actuators", "loops", "tendons")
+SLIDING = 3
+"""Of MuJoCo's dimensions of a contact: friction along its surface; 4 has it about the normal too, 6 against rolling."""
 
 
 def without_meshes(without: str) -> bool:
@@ -108,6 +112,12 @@ def _friction(model: Any) -> None:
     model.pair_dim[:] = 1
 
 
+def _rolling(model: Any) -> None:
+    """Leave contacts no more than sliding friction: none about their normals, and none against rolling."""
+    model.geom_condim[:] = np.minimum(model.geom_condim, SLIDING)
+    model.pair_dim[:] = np.minimum(model.pair_dim, SLIDING)
+
+
 def _contacts(model: Any) -> None:
     import mujoco
 
@@ -151,6 +161,7 @@ def _every(one: Callable[[Any, int], None], count: str) -> Callable[[Any], None]
 _ONE: dict[str, Callable[[Any, int], None]] = {"actuator": _actuator, "loop": _loop, "tendon": _tendon}
 _WHOLE: dict[str, Callable[[Any], None]] = {
     "friction": _friction,
+    "rolling": _rolling,
     "contacts": _contacts,
     "medium": _medium,
     "limits": _limits,

@@ -60,3 +60,33 @@ def test_what_is_left_out_is_as_if_it_was_never_written(words: str, engine: str,
     assert end(loaded(tmp_path, {part, *other}, start, words), engine) == pytest.approx(never, abs=1e-9)
     if part != "friction":  # which is refused
         assert np.abs(end(loaded(tmp_path, {part, *other}, start), engine) - never).max() > 1e-4
+
+
+BALL = """
+<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1" {floor}/>
+<body pos="0 0 .1"><freejoint/><geom name="ball" size=".1" {ball}/></body></worldbody>{pair}
+<keyframe><key name="rolls" qpos="0 0 .099 1 0 0 0" qvel="1 0 0 0 10 3"/></keyframe></mujoco>
+"""
+SLIDES, ROLLS = 'condim="3" friction=".7"', 'condim="{}" friction=".7 .05 .02"'
+PAIR = '<contact><pair geom1="floor" geom2="ball" {}/></contact>'
+
+
+@pytest.mark.parametrize("engine", ["reference", "mujoco"])
+@pytest.mark.parametrize("dimension", [4, 6])
+@pytest.mark.parametrize("listed", [False, True])
+def test_without_rolling_friction_contacts_slide_alone(
+    engine: str, dimension: int, listed: bool, tmp_path: Path
+) -> None:
+    def ends(friction: str, without: str = "") -> np.ndarray:
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.xml"
+        bare = "" if listed else friction
+        pair = PAIR.format(friction.replace('".7 ', '".7 .7 ').replace('.02"', '.02 .02"')) if listed else ""
+        path.write_text(BALL.format(floor=bare, ball=bare, pair=pair), encoding="utf-8")
+        return end(cases.load(str(path), "rolls", t_end=0.5, without=without, friction=1), engine)
+
+    rolls = ROLLS.format(dimension)
+    assert ends(rolls, "rolling") == pytest.approx(
+        ends(SLIDES.replace('".7', '".7 .7' if listed else '".7')), abs=1e-12
+    )
+    if engine == "mujoco":
+        assert np.abs(ends(rolls, "rolling") - ends(rolls)).max() > 1e-3
