@@ -74,4 +74,4 @@ def within_bound(m: Model, w: Work, i: int) -> float:
 def margin(s: Any, m: Model, w: Work, i: int) -> float:
     """How far contact i is from what ends its sticking as it does: its bound, or that rows depend on each other."""
     until_apart = bound(m, i, w.la[w.listed[i]]) * (1.0 - s.growth)
-    return float(min(within_bound(m, w, i), until_apart) if s.held_dependent > 0 else within_bound(m, w, i))
+    return float(min(within_bound(m, w, i), until_apart) if s.growth > 0.0 else within_bound(m, w, i))

@@ -54,34 +54,35 @@ def factor_set(s: Any, m: Model, w: Work) -> None:
     s.rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across, s.unknowns)
     s.dependent_rows = s.unknowns - s.rank
     if s.dependent_rows > 0:
-        factor_in_turn(s, m, w, s.unknowns, s.unknowns)
+        factor_in_turn(s, m, w, s.unknowns)
 
 
 @compiled
 def _factor_as_held(s: Any, m: Model, w: Work) -> None:
-    """Factor A; rows that depended on others when modes were decided do so until they are decided anew.
+    """Factor A; sticking rows that depended on others when modes were decided do so until they are decided anew.
 
     Near there rounding says whether they do, and what they bear is nothing like what they bear where they do not.
     s.growth says how far they are from what calls for a new decision, 1 where that is.
     """
     s.normals = list_unknowns(s, m, w)
-    if s.held_unknowns != s.unknowns or s.held_dependent == 0:
+    sticking = s.unknowns - s.normals
+    if s.held_unknowns != s.unknowns or s.held_rank >= sticking:
         factor_set(s, m, w)
-        s.held_unknowns, s.held_dependent, s.growth = s.unknowns, s.dependent_rows, 0.0
-        s.held_first, s.held_second = s.rank_first, s.rank_second
-        s.grown = max(GROWN, FURTHER * _left(s, w)) if s.dependent_rows > 0 else GROWN
+        s.held_unknowns, s.growth = s.unknowns, 0.0
+        s.held_rank = s.rank_second if s.dependent_rows > 0 else sticking
+        s.grown = max(GROWN, FURTHER * _left(s, w))
         return
     fill(s, m, w)
-    s.rank, s.dependent_rows = s.unknowns - s.held_dependent, s.held_dependent
-    factor_in_turn(s, m, w, s.held_first, s.held_second)
+    factor_in_turn(s, m, w, s.held_rank)
+    s.rank = s.rank_first + s.rank_second
+    s.dependent_rows = s.unknowns - s.rank
     s.growth = _left(s, w) / s.grown
 
 
 @compiled
 def _left(s: Any, w: Work) -> float:
-    """The largest pivot of a row that depends on others."""
-    first = largest_left(w.first, s.rank_first, s.normals)
-    return float(max(first, largest_left(w.second, s.rank_second, s.unknowns - s.normals)))
+    """The largest pivot of a sticking row that depends on others; 0 if none does."""
+    return float(largest_left(w.second, s.held_rank, s.unknowns - s.normals))
 
 
 @compiled

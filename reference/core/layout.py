@@ -141,10 +141,8 @@ STATE = np.dtype(
         ("closed", "i8"),  # rows of loops that were eliminated before
         ("rank_first", "i8"),
         ("rank_second", "i8"),
-        ("held_unknowns", "i8"),  # the same when modes were decided: which rows depend on others stays
-        ("held_dependent", "i8"),
-        ("held_first", "i8"),
-        ("held_second", "i8"),
+        ("held_unknowns", "i8"),  # when modes were decided: which sticking rows depend on others stays,
+        ("held_rank", "i8"),  # of so many that do not
         ("grown", "f8"),  # the pivot at which that is decided anew,
         ("growth", "f8"),  # and what part of it the largest one is
         ("sets", "i8"),  # of modes that were tried

@@ -22,15 +22,15 @@ MOST_SPREADS = 200  # times more where a contact would bear more than it can: ot
 
 
 @compiled
-def factor_in_turn(s: Any, m: Model, w: Work, most_first: int, most_second: int) -> None:
-    """Factor the normal rows alone, and what they leave of the sticking ones; of each so many as are independent."""
+def factor_in_turn(s: Any, m: Model, w: Work, most: int) -> None:
+    """Factor the normal rows alone, and what they leave of the sticking ones, of which `most` count as independent."""
     count, total = s.normals, s.unknowns
     fill(s, m, w)
     for a in range(count):
         for b in range(count):
             w.first[a, b] = w.matrix[a, b]
         w.weight[a] = 1.0
-    s.rank_first = factor_complete(w.first, count, count, w.down, w.across, most_first)
+    s.rank_first = factor_complete(w.first, count, count, w.down, w.across, count)
     for b in range(count, total):
         for a in range(count):
             w.found[a] = w.matrix[a, b]
@@ -45,7 +45,7 @@ def factor_in_turn(s: Any, m: Model, w: Work, most_first: int, most_second: int)
     for a in range(count, total):
         for c in range(count):
             w.held[a, c] = w.matrix[a, c]
-    s.rank_second = factor_complete(w.second, total - count, total - count, w.down2, w.across2, most_second)
+    s.rank_second = factor_complete(w.second, total - count, total - count, w.down2, w.across2, most)
 
 
 @compiled
