@@ -1,4 +1,4 @@
-"""A published quadruped that stands on a floor: feet that stick and joints that rub, whose rows depend on each other."""
+"""A published quadruped that stands on a floor: feet stick, joints rub, and their rows depend on each other."""
 
 from __future__ import annotations
 
