@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+from friction_scenes import sphere_on_floor
 
 from crossbody import cases
 from crossbody.cases import Case, Limit
 from crossbody.cases.defaults import limits_of
+from crossbody.cases.friction_limits import KNOWN
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.verdict import limit_for
 
@@ -46,3 +49,28 @@ def test_a_wider_limit_of_one_engine_is_needed(name: str) -> None:
     wide = [(key, numbers) for key, numbers in worst.items() if numbers[0] > WIDE * numbers[2]]
     assert idle == []
     assert wide == []
+
+
+BALL = """
+<mujoco><worldbody><geom type="plane" size="5 5 .1" condim="{0}"/>
+<body pos="0 0 .1"><freejoint/><geom size=".1" condim="{0}"/></body></worldbody></mujoco>
+"""
+
+
+@pytest.mark.parametrize("who", KNOWN)
+@pytest.mark.parametrize("file", [False, True])
+def test_engines_with_a_friction_of_their_own_are_known_to_be_off_in_any_scene_with_it(
+    who: tuple[str, str], file: bool, tmp_path: Path
+) -> None:
+    """And in none without."""
+    for mu, known in ((3, True), (1, False)):
+        if file:
+            path = tmp_path / f"{mu}.xml"
+            path.write_text(BALL.format(mu), encoding="utf-8")
+            case = cases.load(str(path), friction=1)
+        else:
+            case = cases.from_scene(sphere_on_floor(0.5 if known else 0.0, 0.1))
+        limit = limit_for(limits_of(case), "position", *who)
+        own = file and who == ("drake", "default")  # of a file its bounds are springs too
+        assert limit is not None
+        assert bool(limit.known) == (known or own)

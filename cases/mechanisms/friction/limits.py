@@ -9,31 +9,9 @@ from types import MappingProxyType
 from crossbody.cases.case import Case, Limit, Parameter
 from crossbody.cases.mechanisms.friction.motions import Motion
 
-OWN = (
-    "MuJoCo's own pyramids, soft contacts and step: friction creeps where it holds, pushes off the slip where it "
-    "slides, and lifts what slides fast"
-)
 CREEPS = (
     "it creeps as the engine's own parameters say: it has friction as a function of the slip, and a force needs one"
 )
-RIGID = (
-    "rigid contacts on a grid of steps: friction begins and ends with a step, and so does what it makes of a velocity"
-)
-KNOWN = {
-    ("mujoco", "default"): OWN,
-    ("pinocchio", "admm"): RIGID,
-    ("drake", "matched"): "stiff contacts on a grid of steps, and friction as a steep function of the slip",
-    ("drake", "default"): (
-        "soft contacts, one a pair of solids, where they are deepest; friction as a function of the slip, and the "
-        "normal force of the step before"
-    ),
-    ("dart", "matched"): f"{RIGID}; its friction is bounded along two axes, not in a cone",
-    (
-        "dart",
-        "default",
-    ): f"{RIGID}; its friction is bounded along two axes, not in a cone, and what rests is put to sleep",
-}
-"""What takes engines and profiles outside."""
 NEAR = 0.05
 """Part of a predicted creep by which the measured one may be off."""
 NOTHING: Mapping[tuple[str, str], float] = MappingProxyType({})
@@ -60,8 +38,6 @@ def limits(
         units={name: one.unit for name, one in parameters.items()},
         limits=(
             *case.limits, Limit(metric="creep_speed", value=held, why=HELD), *_predicted(creeps, held),
-            *(Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
-              for (engine, profile), known in KNOWN.items()),
         ),
     )  # fmt: skip
 
