@@ -30,7 +30,6 @@ TURNS = 40  # of directions of slip towards those of acceleration
 TURNED = 1e-12
 MOST_SETS = 256
 BELOW = 1e-6  # part of its bound by which a force stays below it to count as that of a contact that sticks
-BACKWARDS = 8  # beside a mode: it slides against the direction of its row
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 
 
@@ -76,28 +75,18 @@ def change(m: Model, w: Work, i: int, becomes: int) -> None:
 
 
 @compiled
-def _kind(m: Model, w: Work, i: int) -> int:
-    """A number for the mode of contact i: of one that slides along a single row its way as well.
-
-    Along two rows the way is turned until it agrees with where it leads, and the mode alone says which.
-    """
-    backwards = w.state[i] == SLIP and m.tangents[i] == 1 and w.way[m.tangent[i]] < 0.0
-    return int(w.state[i] + (BACKWARDS if backwards else 0))
-
-
-@compiled
 def _seen(s: Any, m: Model, w: Work) -> bool:
     """Whether the set stood before since s.sets was set to 0; note it."""
     for r in range(s.sets):
         same = True
         for i in range(s.nc):
-            same = same and w.sets[r, i] == _kind(m, w, i)
+            same = same and w.sets[r, i] == w.state[i]
         if same:
             return True
     if s.sets == len(w.sets):
         return True
     for i in range(s.nc):
-        w.sets[s.sets, i] = _kind(m, w, i)
+        w.sets[s.sets, i] = w.state[i]
     s.sets += 1
     return False
 
