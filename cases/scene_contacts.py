@@ -27,11 +27,6 @@ highest points of a cylinder's caps, or where it stands four points of its rim; 
 if they lie along each other. Of a hull it is the most: each has as many as corners."""
 WAYS = ("t1", "t2")
 """Directions across the normal: over a plane its x and y, else those of `crossbody.reference.tree.pair_slip`."""
-ROUND = (
-    ("plane", "sphere"), ("plane", "capsule"), ("plane", "box"), ("plane", "ellipsoid"), ("plane", "hull"),
-    ("sphere", "sphere"),
-)  # fmt: skip
-"""Pairs that may have friction."""
 Pose = tuple[Floats, Floats]
 """Rotation (3, 3) and origin (3,), m."""
 SAME_GAP = 1e-9
@@ -271,7 +266,7 @@ def _all(scene: Scene) -> Iterator[Contact | Pair]:
         if (one.type, two.type) not in PLACES:
             one, two = two, one
         places = _places(one, two)
-        known = places > 0 and not _unknown_friction(scene, pair, one, two)
+        known = places > 0 and not _unknown_friction(scene, pair)
         yield Contact(pair=pair, first=one, second=two, places=places) if known else pair
 
 
@@ -286,22 +281,19 @@ def check_pairs(scene: Scene) -> None:
         one, two = sorted((shapes[pair.first], shapes[pair.second]), key=lambda shape: shape.type != "plane")
         if (one.type, two.type) not in PLACES:
             one, two = two, one
-        reason = _unknown_friction(scene, pair, one, two) if _places(one, two) else "their gap is not known"
+        reason = _unknown_friction(scene, pair) if _places(one, two) else "their gap is not known"
         raise SceneError(
             f"Pair {pair.name!r} of a {one.type} and a {two.type} has no rows: {reason}. Valid are pairs of "
-            f"{', '.join(map(' and '.join, PLACES))}; with friction (dimension=3) of "
-            f"{', '.join(map(' and '.join, ROUND))}."
+            f"{', '.join(map(' and '.join, PLACES))}, with friction that slides (dimension=3) or without (1)."
         )
 
 
-def _unknown_friction(scene: Scene, pair: Pair, one: Shape, two: Shape) -> str:
+def _unknown_friction(scene: Scene, pair: Pair) -> str:
     """Return why the machine does not know the friction of a pair; empty if it has none or slides alike all ways."""
     if pair.dimension == 1:
         return ""
     if not scene.friction:
         return "it has friction, and Scene.friction is False (without=friction, or dimension=1, leaves it out)"
-    if (one.type, two.type) not in ROUND:
-        return "friction of such shapes is not done"
     if pair.dimension != 3:
         return f"friction that spins or rolls (dimension={pair.dimension}) is not done; it may be 3"
     if pair.friction[0] != pair.friction[1]:

@@ -14,7 +14,7 @@ from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.tree import balls, kinks, layout, sweeps
 from crossbody.reference.tree.pair_rows import chosen, lowest, touch, turn, upside_down
 
-FREE, CONTACT = 0, 1  # modes, as in crossbody.cases.Mode
+FREE = 0  # a mode, as in crossbody.cases.Mode
 
 
 @kernels.helper
@@ -98,7 +98,7 @@ def _lie(p: Floats, w: Floats, o: int, i: int, mode: Bytes) -> None:
     elif start:
         return
     elif p[k] == pairs.CROSSED:
-        if mode[i] == FREE or mode[i + 1] == CONTACT:
+        if mode[i] == FREE or mode[i + 1] in kinks.CLOSED:
             mode[i] = mode[i + 1]
         mode[i + 1] = FREE
     elif touch(p, w, o, row + layout.ROW)[0][0] < touch(p, w, o, row)[0][0]:
