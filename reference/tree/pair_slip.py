@@ -7,7 +7,7 @@ the tangent plane,
 
 x and t move with the shapes, not with the material: a sphere that rolls on a plane has x' = its centre's velocity. Over
 a plane the frame is the plane's own. On other shapes it is that of the normal in the second shape's axes, which has a
-pole in a direction that no symmetry chooses. x is where the normal row of the place acts (`pair_rows.touch`).
+pole in a direction that no symmetry chooses. x is on the shape over a plane, and of two solids on the first.
 """
 
 from __future__ import annotations
@@ -114,17 +114,18 @@ def _over_plane(p: Array, w: Array, o: int, row: int, N: Vector) -> Vector:
 
 @kernels.helper
 def _between(p: Array, w: Array, o: int, place: int) -> tuple[Vector, Vector]:
-    """Return where two solids meet, and the normal from the first to the second."""
-    one, two = o + layout.FIRST, o + layout.SECOND
+    """Return where two solids meet, on the first one, and the normal from it to the second."""
+    one = o + layout.FIRST
+    r = p[one + layout.SIZE]
     if int(p[one].real) == layout.SPHERE:
         C = origin(p, w, one)
         _, D, length = from_solid(p, w, o, C)
         n = opposite(_spread(D, length))
-        return moved(C, p[one + layout.SIZE], n), n
+        return moved(C, r, n), n
     K, L = axes_meet(p, w, o, lies(p, w, o), place)
     _, D, length = solids.point(L, K)
     n = _spread(D, length)
-    return moved(L, -p[two + layout.SIZE], n), n
+    return moved(K, r, n), n
 
 
 @kernels.helper

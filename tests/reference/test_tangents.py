@@ -42,7 +42,7 @@ def drawn(rng: np.random.Generator, types: tuple[str, str], *, own: bool = False
 
 
 def slips(met: Contacts, x: np.ndarray, turns: Rotation, v: np.ndarray, *, lie: bool) -> np.ndarray:
-    """Return slips (places, 2) of the material where shapes are nearest, of a sphere on a solid its own; NaN of none.
+    """Return slips (places, 2) of the material where shapes are nearest, of two solids on the first; NaN of none.
 
     Args:
         met: the contact.
@@ -54,7 +54,7 @@ def slips(met: Contacts, x: np.ndarray, turns: Rotation, v: np.ndarray, *, lie: 
     poses = dict(zip(NAMES, zip(turns.as_matrix(), x, strict=True), strict=True))
     contact, found = met.all[0], met.touches(poses.__getitem__, None, {0: lie})
     (one, _), (two, _) = met.ends(poses.__getitem__, contact)
-    beside = found.gap * (contact.first.type == "sphere")
+    beside = np.where(found.normal.any(axis=1), found.gap, 0.0) * (contact.first.type != "plane")
     slip = []
     for normal, point in zip(found.normal, found.point - beside[:, None] * found.normal, strict=True):
         first, second = v[:, :3] + np.cross(turns.apply(v[:, 3:]), point - x)
