@@ -266,8 +266,14 @@ def _all(scene: Scene) -> Iterator[Contact | Pair]:
         if (one.type, two.type) not in PLACES:
             one, two = two, one
         places = _places(one, two)
-        known = places > 0 and not _unknown_friction(scene, pair)
+        known = places > 0 and not unknown_friction(scene, pair)
         yield Contact(pair=pair, first=one, second=two, places=places) if known else pair
+
+
+def unknown(scene: Scene) -> dict[frozenset[str], str]:
+    """Return of the pairs that have no rows because of their friction the reason, by their shapes."""
+    told = {frozenset((pair.first, pair.second)): unknown_friction(scene, pair) for pair in watched(scene)}
+    return {shapes: reason for shapes, reason in told.items() if reason}
 
 
 def check_pairs(scene: Scene) -> None:
@@ -281,23 +287,23 @@ def check_pairs(scene: Scene) -> None:
         one, two = sorted((shapes[pair.first], shapes[pair.second]), key=lambda shape: shape.type != "plane")
         if (one.type, two.type) not in PLACES:
             one, two = two, one
-        reason = _unknown_friction(scene, pair) if _places(one, two) else "their gap is not known"
+        reason = unknown_friction(scene, pair) if _places(one, two) else "their gap is not known"
         raise SceneError(
             f"Pair {pair.name!r} of a {one.type} and a {two.type} has no rows: {reason}. Valid are pairs of "
             f"{', '.join(map(' and '.join, PLACES))}, with friction that slides (dimension=3) or without (1)."
         )
 
 
-def _unknown_friction(scene: Scene, pair: Pair) -> str:
+def unknown_friction(scene: Scene, pair: Pair) -> str:
     """Return why the machine does not know the friction of a pair; empty if it has none or slides alike all ways."""
     if pair.dimension == 1:
         return ""
     if not scene.friction:
-        return "it has friction, and Scene.friction is False (without=friction, or dimension=1, leaves it out)"
+        return "its friction is left out where Scene.friction is False (a file's friction=0; friction=1 has it)"
     if pair.dimension != 3:
-        return f"friction that spins or rolls (dimension={pair.dimension}) is not done; it may be 3"
+        return f"friction that spins or rolls is not done (dimension={pair.dimension}, condim in a file; it may be 3)"
     if pair.friction[0] != pair.friction[1]:
-        return f"friction that differs by direction ({pair.friction[0]} and {pair.friction[1]}) is not done"
+        return f"friction that differs by direction is not done ({pair.friction[0]} and {pair.friction[1]})"
     return ""
 
 
