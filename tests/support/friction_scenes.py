@@ -21,6 +21,7 @@ PLANAR = (("x", (1, 0, 0), "slide"), ("z", (0, 0, 1), "slide"), ("turn", (0, 1, 
 HALF = (0.2, 0.15, 0.1)
 ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
 EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
+SOLID = {"sphere": (0.1, 0, 0), "box": (0.2, 0.15, 0.1), "cylinder": (0.15, 0.1, 0), "capsule": (0.08, 0.2, 0)}
 HEAVIEST = 2.0  # kg
 
 
@@ -125,6 +126,26 @@ def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int 
     pairs += [pair(f"s{i}", f"s{i + 1}", mu, law) for i in range(1, len(kinds) - 1)]
     joints = tuple(Joint(name=body.name, body=body.name, type="free") for body in bodies)
     scene = Scene(bodies=tuple(bodies), joints=joints, shapes=tuple(shapes), pairs=tuple(pairs))
+    return scene, np.array(q), np.array(v), mu
+
+
+def piled(seed: int, kinds: tuple[str, str]) -> Any:
+    """Return a body that falls onto another one, which falls onto a floor, their start and mu; all rub."""
+    rng = np.random.default_rng(seed)
+    mu, law = float(rng.uniform(0.0, 1.0)), RowLaw(a0=float(10 ** rng.uniform(3, 4.5)), a1=float(rng.uniform(5, 200)))
+    names, q, v = ("up", "low"), list[float](), list[float]()
+    for height in (0.75, 0.3):
+        turn = rng.normal(size=4)
+        q += [*(0.03 * rng.normal(size=2)), height, *(turn / np.linalg.norm(turn))]
+        v += [*(0.5 * rng.normal(size=2)), -1.0, *(4.0 * rng.normal(size=3))]
+    scene = Scene(
+        bodies=tuple(box_body(name, HALF, float(rng.uniform(0.5, HEAVIEST))) for name in names),
+        joints=tuple(Joint(name=name, body=name, type="free") for name in names),
+        shapes=(Shape(name="floor", type="plane"), *(
+            Shape(name=name, body=name, type=kind, size=SOLID[kind]) for name, kind in zip(names, kinds, strict=True)
+        )),
+        pairs=(pair("floor", "up", mu, law), pair("floor", "low", mu, law), pair("up", "low", mu, law)),
+    )  # fmt: skip
     return scene, np.array(q), np.array(v), mu
 
 
