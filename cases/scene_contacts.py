@@ -298,12 +298,13 @@ def unknown_friction(scene: Scene, pair: Pair) -> str:
     """Return why the machine does not know the friction of a pair; empty if it has none or slides alike all ways."""
     if pair.dimension == 1:
         return ""
-    if not scene.friction:
-        return "its friction is left out where Scene.friction is False (a file's friction=0; friction=1 has it)"
     if pair.dimension != 3:
-        return f"friction that spins or rolls is not done (dimension={pair.dimension}, condim in a file; it may be 3)"
+        many = f"dimension={pair.dimension}, condim in a file"
+        return f"friction that spins or rolls is not done ({many}; 3, or without=rolling, keeps what slides)"
     if pair.friction[0] != pair.friction[1]:
         return f"friction that differs by direction is not done ({pair.friction[0]} and {pair.friction[1]})"
+    if not scene.friction:
+        return "its friction is left out where Scene.friction is False (a file's friction=0; friction=1 has it)"
     return ""
 
 
