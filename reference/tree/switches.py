@@ -16,7 +16,7 @@ from crossbody.reference.tree import pair_slip as slip
 from crossbody.reference.tree.pair_rows import axis, cap, chosen, lowest, touch, turn, upside_down
 
 FREE = 0  # a mode, as in crossbody.cases.Mode
-ASIDE = 2e-3  # rad, from where a load leans to the first point on which a cylinder stands
+ASIDE = 1e-2  # rad, from where a load leans to the first point on which a cylinder stands
 
 
 @kernels.helper
