@@ -27,11 +27,6 @@ highest points of a cylinder's caps, or where it stands four points of its rim; 
 if they lie along each other. Of a hull it is the most: each has as many as corners."""
 WAYS = ("t1", "t2")
 """Directions across the normal: over a plane its x and y, else those of `crossbody.reference.tree.pair_slip`."""
-ROUND = (
-    ("plane", "sphere"), ("plane", "capsule"), ("plane", "box"), ("plane", "ellipsoid"), ("plane", "hull"),
-    ("sphere", "sphere"),
-)  # fmt: skip
-"""Pairs that may have friction."""
 Pose = tuple[Floats, Floats]
 """Rotation (3, 3) and origin (3,), m."""
 SAME_GAP = 1e-9
@@ -271,8 +266,14 @@ def _all(scene: Scene) -> Iterator[Contact | Pair]:
         if (one.type, two.type) not in PLACES:
             one, two = two, one
         places = _places(one, two)
-        known = places > 0 and not _unknown_friction(scene, pair, one, two)
+        known = places > 0 and not unknown_friction(scene, pair)
         yield Contact(pair=pair, first=one, second=two, places=places) if known else pair
+
+
+def unknown(scene: Scene) -> dict[frozenset[str], str]:
+    """Return of the pairs that have no rows because of their friction the reason, by their shapes."""
+    told = {frozenset((pair.first, pair.second)): unknown_friction(scene, pair) for pair in watched(scene)}
+    return {shapes: reason for shapes, reason in told.items() if reason}
 
 
 def check_pairs(scene: Scene) -> None:
@@ -286,26 +287,24 @@ def check_pairs(scene: Scene) -> None:
         one, two = sorted((shapes[pair.first], shapes[pair.second]), key=lambda shape: shape.type != "plane")
         if (one.type, two.type) not in PLACES:
             one, two = two, one
-        reason = _unknown_friction(scene, pair, one, two) if _places(one, two) else "their gap is not known"
+        reason = unknown_friction(scene, pair) if _places(one, two) else "their gap is not known"
         raise SceneError(
             f"Pair {pair.name!r} of a {one.type} and a {two.type} has no rows: {reason}. Valid are pairs of "
-            f"{', '.join(map(' and '.join, PLACES))}; with friction (dimension=3) of "
-            f"{', '.join(map(' and '.join, ROUND))}."
+            f"{', '.join(map(' and '.join, PLACES))}, with friction that slides (dimension=3) or without (1)."
         )
 
 
-def _unknown_friction(scene: Scene, pair: Pair, one: Shape, two: Shape) -> str:
+def unknown_friction(scene: Scene, pair: Pair) -> str:
     """Return why the machine does not know the friction of a pair; empty if it has none or slides alike all ways."""
     if pair.dimension == 1:
         return ""
-    if not scene.friction:
-        return "it has friction, and Scene.friction is False (without=friction, or dimension=1, leaves it out)"
-    if (one.type, two.type) not in ROUND:
-        return "friction of such shapes is not done"
     if pair.dimension != 3:
-        return f"friction that spins or rolls (dimension={pair.dimension}) is not done; it may be 3"
+        many = f"dimension={pair.dimension}, condim in a file"
+        return f"friction that spins or rolls is not done ({many}; 3, or without=rolling, keeps what slides)"
     if pair.friction[0] != pair.friction[1]:
-        return f"friction that differs by direction ({pair.friction[0]} and {pair.friction[1]}) is not done"
+        return f"friction that differs by direction is not done ({pair.friction[0]} and {pair.friction[1]})"
+    if not scene.friction:
+        return "its friction is left out where Scene.friction is False (a file's friction=0; friction=1 has it)"
     return ""
 
 

@@ -17,6 +17,7 @@ from crossbody.cases.scene_contacts import contacts
 
 ROLLS = 1e-3
 """Of the rate of the tilt, what of it is across the tilt in a motion that is not in a plane."""
+PRESSED = (Mode.CONTACT, Mode.STICK, Mode.SLIP)
 TILTED = 1
 """Value of the variable that says how a cylinder is, off its caps."""
 
@@ -52,7 +53,7 @@ def _rolled(run: Trajectory, variable: int, row: int, name: str) -> tuple[float,
             continue  # only samples are kept
         k, cap = int(there[-1]), row + (0 if switch.after == TILTED + 1 else 2)
         before = run.mode[there[0]]
-        if before[cap] != Mode.CONTACT or before[cap + 1] == Mode.CONTACT:
+        if before[cap] not in PRESSED or before[cap + 1] in PRESSED:
             continue
         ahead, across = np.diff(run.gap[k : k + 2, row + 2 : row + 4] - run.gap[k : k + 2, row : row + 2], axis=0)[0]
         if abs(across) > ROLLS * np.hypot(ahead, across):

@@ -100,13 +100,14 @@ def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
     from crossbody.cases.files.contacts import first_contact
     from crossbody.cases.files.reading import model_of
-    from crossbody.cases.scene_contacts import contacts, inert
+    from crossbody.cases.scene_contacts import contacts, inert, unknown
 
     model = model_of(Path(case.file), str(case.parameters.get("without", "")))
     pairs = () if case.scene is None else (*(one.pair for one in contacts(case.scene)), *inert(case.scene))
     known = {frozenset((pair.first, pair.second)) for pair in pairs}
+    rubs = {} if case.scene is None else unknown(case.scene)
     looked = run.outcome in (Outcome.FINISHED, Outcome.TIME_LIMIT)
-    found = first_contact(model, run.t, run.q, run.v, known) if looked else ""
+    found = first_contact(model, run.t, run.q, run.v, known, rubs) if looked else ""
     return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Mapping, Set
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +18,9 @@ APART, HALVINGS = 1e-3, 30
 """Longest time between two looks, s, and how often it is halved where two shapes have met in between."""
 
 
-def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozenset[str]]) -> str:
+def first_contact(
+    model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozenset[str]], rubs: Mapping[frozenset[str], str]
+) -> str:
     """Return a sentence on the first instant at which two shapes come within reach; empty if none do.
 
     Args:
@@ -27,6 +29,7 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
         q: positions there (n, nq).
         v: velocities there (n, nv).
         known: pairs of shapes that have rows.
+        rubs: of pairs that have none because of their friction what is wrong with it.
     """
     import mujoco
 
@@ -53,38 +56,26 @@ def first_contact(model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozen
             both = " and ".join(_named(model, geom) for geom in pair)
             return (
                 f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for them, because "
-                f"{_why(model, pair)}. {_advice(model, pair)}without=contacts leaves all contacts out, and a shorter "
-                "t_end ends before."
+                f"{_why(model, pair, rubs)}. {_advice(model, pair)}without=contacts leaves all contacts out, and a "
+                "shorter t_end ends before."
             )
     return ""
 
 
-_FRICTION = (
-    "they have friction (without=friction leaves it out of every engine; friction=1 has it in reference:compiled and "
-    "in MuJoCo, where shapes that slide and neither spin nor roll meet planes, or spheres each other)"
-)
-
-
-def _why(model: Any, pair: tuple[int, ...]) -> str:
+def _why(model: Any, pair: tuple[int, ...], rubs: Mapping[frozenset[str], str]) -> str:
     """Return why such shapes have no row."""
     import mujoco
 
+    if reason := rubs.get(frozenset(map(mjcf.names(model, "geom"), pair))):
+        return f"{reason}; without=friction leaves friction out of every engine"
     types = (mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower() for geom in pair)
     one, two = ("hull" if kind == "mesh" else kind for kind in types)
     if not {(one, two), (two, one)} & PLACES.keys():
         return f"no gap of a {one} and a {two} is known"
-    reasons = [_FRICTION] * _rubs(model, pair)
     if "hull" in (one, two):
         most = PLACES["plane", "hull"]
-        reasons.append(f"the hull has more than {most} corners (a mesh of a file has at most its maxhullvert)")
-    return ", or ".join(reasons) or "no joint moves one against the other"
-
-
-def _rubs(model: Any, pair: tuple[int, ...]) -> bool:
-    """Return whether a contact of two shapes has friction: by the one of higher priority, else by either."""
-    geoms = np.array(pair)
-    priority = model.geom_priority[geoms]
-    return bool(model.geom_condim[geoms[priority == priority.max()]].max() > 1)
+        return f"the hull has more than {most} corners (a mesh of a file has at most its maxhullvert)"
+    return "no joint moves one against the other"
 
 
 def _named(model: Any, geom: int) -> str:

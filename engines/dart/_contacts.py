@@ -36,8 +36,8 @@ DETECTORS = {
 SOLIDS = ("plane", "sphere", "box", "capsule", "ellipsoid")
 
 
-def why_not(scene: Scene) -> str | None:
-    """Return why DART cannot run a scene with friction; None if it can."""
+def why_not(scene: Scene, detector: str) -> str | None:
+    """Return why DART cannot run a scene with friction, with one of its detectors; None if it can."""
     if found := why_no_steps("DART", scene):
         return found
     forces = Forces(scene)
@@ -48,6 +48,9 @@ def why_not(scene: Scene) -> str | None:
     for contact in contacts(scene):
         if contact.second.type not in SOLIDS:
             return f"DART is given solids of {', '.join(SOLIDS)}; {contact.second.name!r} is a {contact.second.type}."
+        for shape in (contact.first, contact.second):
+            if detector == "fcl" and shape.type == "capsule":
+                return f"DART with FCL's detector takes the capsule {shape.name!r} for a sphere; its own has capsules."
     return None
 
 

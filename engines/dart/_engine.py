@@ -24,6 +24,7 @@ from crossbody.engines.contract import Engine, Run
 from crossbody.engines.dart import _contacts
 
 THICK, WIDE = 1.0, 2.0  # m, of the box that stands for a plane
+DETECTOR = {"matched": "dart", "default": "fcl"}
 
 
 class World:
@@ -112,7 +113,7 @@ class Dart(Engine):
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         if case.scene is not None and frictional(case.scene):
-            return why_beside("DART", case) or _contacts.why_not(case.scene)
+            return why_beside("DART", case) or _contacts.why_not(case.scene, DETECTOR[profile])
         if profile == "default":
             return (
                 "Without friction DART differs from the profile matched by its restitution alone, which is a setting."
@@ -149,12 +150,15 @@ class Dart(Engine):
             "dt": Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True),
             "restitution": Parameter(default=_bounce(case) if matched else 0.0, doc="of contacts", low=0.0, high=1.0),
             "detector": Parameter(
-                default="dart" if matched else "fcl", choices=tuple(_contacts.DETECTORS), doc="what finds contacts"
+                default=DETECTOR[profile], choices=tuple(_contacts.DETECTORS), doc="what finds contacts"
             ),
             "sleep": Parameter(default=not matched, doc="whether what rests is put to sleep", low=0, high=1),
             "max_steps": STEPS,
         }  # fmt: skip
         used = _settings.chosen(self.name, profile, known, given)
+        assert case.scene is not None
+        if reason := _contacts.why_not(case.scene, str(used["detector"])):
+            raise CaseUnsupported(reason)
         stepper = _contacts.Rubs(case, used)
         return RubbingRun(
             case=case, engine=self.name, profile=profile, settings=used, stepper=stepper,

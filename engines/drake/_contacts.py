@@ -11,6 +11,7 @@ from pydrake.geometry import (
     Box,
     Capsule,
     CollisionFilterDeclaration,
+    Cylinder,
     Ellipsoid,
     GeometrySet,
     HalfSpace,
@@ -51,8 +52,8 @@ class Rubs:
     Args:
         case: a scene with friction.
         used: settings: dt, approximation, stiction, stiffness (0: Drake's own).
-        matched: whether places of boxes, capsules and hulls are points; else solids are Drake's own, of which it has
-            one contact, where they are deepest.
+        matched: whether places of boxes, capsules and hulls over planes are points; else solids are Drake's own, of
+            which it has one contact, where they are deepest.
     """
 
     def __init__(self, case: Case, used: Mapping[str, Any], matched: bool) -> None:
@@ -80,10 +81,10 @@ class Rubs:
         """Give every pair solids of its own, that meet each other alone: friction is a pair's."""
         groups, everything = [], GeometrySet()
         for contact in contacts(self.scene):
-            ends = []
+            ends, points = [], self.matched and contact.first.type == "plane"
             for shape in (contact.first, contact.second):
                 group = GeometrySet()
-                for k, (place, solid) in enumerate(_solids(shape, self.matched)):
+                for k, (place, solid) in enumerate(_solids(shape, points)):
                     carrier = plant.GetBodyByName(shape.body) if shape.body else plant.world_body()
                     name = f"{contact.pair.name} {shape.name} {k}"
                     made = plant.RegisterCollisionGeometry(carrier, place, solid, name, self._surface(contact.friction))
@@ -175,7 +176,7 @@ def _solids(shape: Shape, points: bool) -> list[tuple[Any, Any]]:
         return [(RigidTransform(place @ end), Sphere(radius)) for end in ends]
     solids = {
         "plane": lambda: HalfSpace(), "sphere": lambda: Sphere(size[0]),
-        "capsule": lambda: Capsule(size[0], 2.0 * size[1]),
+        "capsule": lambda: Capsule(size[0], 2.0 * size[1]), "cylinder": lambda: Cylinder(size[0], 2.0 * size[1]),
         "box": lambda: Box(*(2.0 * side for side in size)), "ellipsoid": lambda: Ellipsoid(*size),
     }  # fmt: skip
     return [(place, solids[shape.type]())]

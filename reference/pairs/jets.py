@@ -106,6 +106,12 @@ def moved(x: Vector, c: float, y: Vector) -> Vector:
 
 
 @kernels.helper
+def opposite(x: Vector) -> Vector:
+    """Return the vector -x."""
+    return scaled(-1.0, x[0]), scaled(-1.0, x[1]), scaled(-1.0, x[2])
+
+
+@kernels.helper
 def value(x: Vector) -> Point:
     """Return what a vector is now."""
     return x[0][0], x[1][0], x[2][0]

@@ -1,8 +1,8 @@
 """A sphere or capsule against a solid: the gap between their nearest points.
 
-Every function returns the distance of a point from a solid as a jet, below 0 inside, and the unit vector from the solid
-to the point. The nearest point moves from face to edge to corner: distance and normal are continuous there, the second
-derivative is not.
+Every function returns the distance of a point from a solid as a jet, below 0 inside, and a vector from the solid to the
+side of the point, with its length. The nearest point moves from face to edge to corner: distance and normal are
+continuous there, the second derivative is not.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from crossbody.reference.pairs.jets import (
     dot,
     less,
     moved,
+    opposite,
     over,
     part,
     root,
@@ -42,7 +43,7 @@ ABREAST = 1e-5  # part of the length that ends are in which are no more than abr
 INSTANT = 1e-12
 """s, by which ways that are equal now are told apart."""
 Distance = Any
-"""A jet, and three numbers."""
+"""A jet, a vector, and its length as a jet."""
 
 
 @kernels.helper
@@ -66,17 +67,18 @@ def _beyond(s: Jet, half: float, side: int) -> Jet:
 
 
 @kernels.helper
-def _toward(D: Vector, d: Jet) -> Distance:
-    """Return the length d of D and its direction; not a number where D has none."""
+def unit(D: Vector, d: Jet) -> Point:
+    """Return the direction now of a vector that is d long; not a number where it has none."""
     x, y, z = value(D)
-    return d, (part(x, d[0]), part(y, d[0]), part(z, d[0]))
+    return part(x, d[0]), part(y, d[0]), part(z, d[0])
 
 
 @kernels.helper
 def point(C: Vector, M: Vector) -> Distance:
     """Return the distance of C from the point M."""
     D = apart(C, M)
-    return _toward(D, root(dot(D, D)))
+    d = root(dot(D, D))
+    return d, D, d
 
 
 @kernels.helper
@@ -89,10 +91,10 @@ def segment(C: Vector, M: Vector, A: Vector, half: float, sides: Any = FREE) -> 
 @kernels.helper
 def _face(s: Jet, half: float, X: Vector) -> Distance:
     """Return the distance from the nearer of two faces at -half and half along X."""
-    x, y, z = value(X)
+    one = shifted(scaled(0.0, s), 1.0)
     if s[0].real < 0.0:
-        return shifted(scaled(-1.0, s), -half), (-x, -y, -z)
-    return shifted(s, -half), (x, y, z)
+        return shifted(scaled(-1.0, s), -half), opposite(X), one
+    return shifted(s, -half), X, one
 
 
 @kernels.helper
@@ -105,7 +107,8 @@ def box(C: Vector, M: Vector, X: Vector, Y: Vector, Z: Vector, size: Point, side
     if square[0].real > 0.0:
         zero = scaled(0.0, a)
         out = along(along(along((zero, zero, zero), a, X), b, Y), c, Z)
-        return _toward(out, root(square))
+        far = root(square)
+        return far, out, far
     p, q, r = abs(x[0].real) - size[0].real, abs(y[0].real) - size[1].real, abs(z[0].real) - size[2].real
     if p >= q and p >= r:
         return _face(x, size[0], X)
@@ -133,12 +136,11 @@ def cylinder(C: Vector, M: Vector, A: Vector, radius: float, half: float, sides:
         rho = root(square)
         a, b = shifted(rho, -radius), _beyond(s, half, sides[0])
         far = root(add(times(a, a), times(b, b)))
-        return _toward(along(_scaled_to(out, a, rho), b, A), far)
+        return far, along(_scaled_to(out, a, rho), b, A), far
     if not wide and abs(s[0].real) - half.real > np.sqrt(square[0].real) - radius.real:
         return _face(s, half, A)
     rho = root(square)
-    x, y, z = value(out)
-    return shifted(rho, -radius), (part(x, rho[0]), part(y, rho[0]), part(z, rho[0]))
+    return shifted(rho, -radius), out, rho
 
 
 @kernels.helper

@@ -21,7 +21,7 @@ from crossbody.reference.tree.pair_rows import bend
 
 SMALL = 1e-3  # m or rad, and 1/s: coordinates are known to the tolerance of this at least
 ROUNDING = 1e-14  # of a value
-CLOSED = (1, 3)  # modes, as in crossbody.cases.Mode: CONTACT, COLLISION
+CLOSED = (1, 3, 6, 7)  # modes, as in crossbody.cases.Mode: CONTACT, COLLISION, STICK, SLIP
 NONE = 1e200  # a bound beyond it is none
 TIGHT = 1e-8  # tolerance above which v |v| is as good as smooth
 

@@ -37,7 +37,7 @@ def axis(p: Array, w: Array, o: int, column: int) -> Any:
 
 
 @kernels.helper
-def _sign(place: int, bit: int) -> float:
+def sign(place: int, bit: int) -> float:
     """Return -1 or 1 by a bit of a place: which end, cap or corner."""
     return 1.0 if (place >> bit) & 1 else -1.0
 
@@ -76,13 +76,13 @@ def bend(p: Array, w: Array, pair: int, which: int) -> tuple[float, float]:
 
 
 @kernels.helper
-def _from_solid(p: Array, w: Array, pair: int, C: Any) -> Any:
-    """Return the distance of a point from the surface of the second shape of a pair, and the direction to the point."""
+def from_solid(p: Array, w: Array, pair: int, C: Any) -> Any:
+    """Return the distance of a point from the second shape's surface, a vector towards the point, and its length."""
     o = pair + layout.SECOND
     kind, M, s = int(p[o].real), origin(p, w, o), o + layout.SIZE
     if kind == layout.SPHERE:
-        d, n = solids.point(C, M)
-        return shifted(d, -p[s]), n
+        d, D, length = solids.point(C, M)
+        return shifted(d, -p[s]), D, length
     sides = (_side(p, pair, kind, 0), _side(p, pair, kind, 1), _side(p, pair, kind, 2))
     if kind == layout.BOX:
         X, Y, Z = axis(p, w, o, 0), axis(p, w, o, 1), axis(p, w, o, 2)
@@ -90,8 +90,8 @@ def _from_solid(p: Array, w: Array, pair: int, C: Any) -> Any:
     A = axis(p, w, o, 2)
     if kind == layout.CYLINDER:
         return solids.cylinder(C, M, A, p[s], p[s + 1], sides)
-    d, n = solids.segment(C, M, A, p[s + 1], sides)
-    return shifted(d, -p[s]), n
+    d, D, length = solids.segment(C, M, A, p[s + 1], sides)
+    return shifted(d, -p[s]), D, length
 
 
 @kernels.helper
@@ -167,6 +167,22 @@ def turn(p: Array, w: Array, o: int, now: int) -> float:
 
 
 @kernels.helper
+def cap(p: Array, w: Array, o: int, top: bool) -> Any:
+    """Return the middle of a cap of the cylinder at p[o:]."""
+    half = p[o + layout.SIZE + 1]
+    return moved(origin(p, w, o), half if top else -half, axis(p, w, o, 2))
+
+
+@kernels.helper
+def stands_on(p: Array, w: Array, o: int, now: int, place: int) -> Any:
+    """Return one of the four points of its rim on which the cylinder of the pair at p[o:] stands, as it does now."""
+    two = o + layout.SECOND
+    r, angle = p[two + layout.SIZE], p[int(p[tree.AT_SIDE].real) + int(p[o + layout.PHASE].real)] + 0.5 * np.pi * place
+    E = cap(p, w, two, now != layout.ALONG)
+    return moved(moved(E, r * np.cos(angle), axis(p, w, two, 0)), r * np.sin(angle), axis(p, w, two, 1))
+
+
+@kernels.helper
 def _cylinder(p: Array, w: Array, o: int, place: int) -> Any:
     """Return the same of a cylinder over a plane: of each cap the lowest and the highest point.
 
@@ -175,32 +191,36 @@ def _cylinder(p: Array, w: Array, o: int, place: int) -> Any:
     """
     one, two = o + layout.FIRST, o + layout.SECOND
     P, N, r, now = origin(p, w, one), axis(p, w, one, 2), p[two + layout.SIZE], lies(p, w, o)
-    C, X, Y, Z = origin(p, w, two), axis(p, w, two, 0), axis(p, w, two, 1), axis(p, w, two, 2)
     if now == layout.CROSSED:
-        E = moved(C, _sign(place, 1) * p[two + layout.SIZE + 1], Z)
-        h, n, at = planes.rim(P, N, E, X, Y, -_sign(place, 0) * r)
+        E, X, Y = cap(p, w, two, sign(place, 1) > 0.0), axis(p, w, two, 0), axis(p, w, two, 1)
+        h, n, at = planes.rim(P, N, E, X, Y, -sign(place, 0) * r)
     else:
-        E = moved(C, (-1.0 if now == layout.ALONG else 1.0) * p[two + layout.SIZE + 1], Z)
-        angle = p[int(p[tree.AT_SIDE].real) + int(p[o + layout.PHASE].real)] + 0.5 * np.pi * place
-        h, n, at = planes.sphere(P, N, moved(moved(E, r * np.cos(angle), X), r * np.sin(angle), Y), 0.0 * r)
+        h, n, at = planes.sphere(P, N, stands_on(p, w, o, now, place), 0.0 * r)
     return shifted(h, -p[o + layout.MARGIN]), n, at
 
 
 @kernels.helper
-def _capsules(p: Array, w: Array, o: int, place: int) -> Any:
-    """Return the same of two capsules: side by side they meet where they end, crossed at one place."""
+def axes_meet(p: Array, w: Array, o: int, now: int, place: int) -> Any:
+    """Return where the axes of two capsules are nearest: side by side where they end, crossed at one place."""
     one, two = o + layout.FIRST, o + layout.SECOND
     M, A, a = origin(p, w, one), axis(p, w, one, 2), p[one + layout.SIZE + 1]
     N, B, b = origin(p, w, two), axis(p, w, two, 2), p[two + layout.SIZE + 1]
-    if lies(p, w, o) == layout.ALONG:
-        K, L = solids.ends(M, A, a, N, B, b, _sign(place, 0))
-    elif place == 0:
-        K, L = solids.segments(M, A, a, N, B, b)
-    else:
-        zero = 0.0 * A[0][0]
+    if now == layout.ALONG:
+        return solids.ends(M, A, a, N, B, b, sign(place, 0))
+    return solids.segments(M, A, a, N, B, b)
+
+
+@kernels.helper
+def _capsules(p: Array, w: Array, o: int, place: int) -> Any:
+    """Return the same of two capsules, which meet where their axes are nearest."""
+    one, now = o + layout.FIRST, lies(p, w, o)
+    if now != layout.ALONG and place > 0:
+        M = origin(p, w, one)
+        zero = 0.0 * M[0][0]
         return (layout.FAR + zero, zero, zero), (zero, zero, zero), value(M)
-    (d, n), c = solids.point(L, K), value(L)
-    r, s = p[one + layout.SIZE], p[two + layout.SIZE]
+    K, L = axes_meet(p, w, o, now, place)
+    (d, D, length), c = solids.point(L, K), value(L)
+    n, r, s = solids.unit(D, length), p[one + layout.SIZE], p[o + layout.SECOND + layout.SIZE]
     return shifted(d, -r - s - p[o + layout.MARGIN]), n, (c[0] - s * n[0], c[1] - s * n[1], c[2] - s * n[2])
 
 
@@ -223,8 +243,8 @@ def touch(p: Array, w: Array, o: int, row: int) -> Any:
         return shifted(h, -p[o + layout.MARGIN]), n, at
     if first == layout.SPHERE:
         C, r = origin(p, w, one), p[one + layout.SIZE]
-        d, m = _from_solid(p, w, o, C)
-        c = value(C)
+        d, D, length = from_solid(p, w, o, C)
+        m, c = solids.unit(D, length), value(C)
         return shifted(d, -r - p[o + layout.MARGIN]), (-m[0], -m[1], -m[2]), (
             c[0] - r * m[0], c[1] - r * m[1], c[2] - r * m[2],
         )  # fmt: skip

@@ -7,7 +7,7 @@ the tangent plane,
 
 x and t move with the shapes, not with the material: a sphere that rolls on a plane has x' = its centre's velocity. Over
 a plane the frame is the plane's own. On other shapes it is that of the normal in the second shape's axes, which has a
-pole in a direction that no symmetry chooses.
+pole in a direction that no symmetry chooses. x is on the shape over a plane, and of two solids on the first.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import Any
 
 from crossbody.reference import kernels
 from crossbody.reference.kinds import Array
-from crossbody.reference.pairs import layout
+from crossbody.reference.pairs import layout, solids
 from crossbody.reference.pairs.jets import (
     Jet,
     Vector,
     add,
     along,
-    apart,
     dot,
     moved,
+    opposite,
     over,
     root,
     scaled,
@@ -33,7 +33,7 @@ from crossbody.reference.pairs.jets import (
     value,
 )
 from crossbody.reference.tree import layout as tree
-from crossbody.reference.tree.pair_rows import axis, origin
+from crossbody.reference.tree.pair_rows import axes_meet, axis, cap, from_solid, lies, origin, sign, stands_on
 from crossbody.reference.tree.points import direction, field, point, pull
 
 POLE = ((0.8, -0.6, 0.0), (0.48, 0.64, -0.6), (0.36, 0.48, 0.8))
@@ -50,6 +50,15 @@ def _spread(r: Vector, k: Jet) -> Vector:
 def _times(k: Jet, r: Vector) -> Vector:
     """Return the vector k r."""
     return times(k, r[0]), times(k, r[1]), times(k, r[2])
+
+
+@kernels.helper
+def _on_rim(p: Array, w: Array, o: int, place: int, N: Vector) -> Vector:
+    """Return where the cylinder at p[o:] is lowest over a plane with normal N, or highest, on a cap by the place."""
+    r, X, Y = -sign(place, 0) * p[o + layout.SIZE], axis(p, w, o, 0), axis(p, w, o, 1)
+    x, y = dot(N, X), dot(N, Y)
+    s = scaled(-1.0 / r, root(add(times(x, x), times(y, y))))
+    return along(along(cap(p, w, o, sign(place, 1) > 0.0), over(x, s), X), over(y, s), Y)
 
 
 @kernels.helper
@@ -94,16 +103,40 @@ def _frame(p: Array, w: Array, o: int, n: Vector) -> tuple[Vector, Vector]:
 
 
 @kernels.helper
+def _over_plane(p: Array, w: Array, o: int, row: int, N: Vector) -> Vector:
+    """Return where the pair of a plane with normal N and a shape meets in the place of the row at p[row:]."""
+    two, place = o + layout.SECOND, int(p[row + layout.PLACE].real)
+    if int(p[two].real) != layout.CYLINDER:
+        return _lowest(p, w, two, row, N)
+    now = lies(p, w, o)
+    return _on_rim(p, w, two, place, N) if now == layout.CROSSED else stands_on(p, w, o, now, place)
+
+
+@kernels.helper
+def _between(p: Array, w: Array, o: int, place: int) -> tuple[Vector, Vector]:
+    """Return where two solids meet, on the first one, and the normal from it to the second."""
+    one = o + layout.FIRST
+    r = p[one + layout.SIZE]
+    if int(p[one].real) == layout.SPHERE:
+        C = origin(p, w, one)
+        _, D, length = from_solid(p, w, o, C)
+        n = opposite(_spread(D, length))
+        return moved(C, r, n), n
+    K, L = axes_meet(p, w, o, lies(p, w, o), place)
+    _, D, length = solids.point(L, K)
+    n = _spread(D, length)
+    return moved(K, r, n), n
+
+
+@kernels.helper
 def meeting(p: Array, w: Array, o: int, row: int) -> tuple[Vector, Vector, Vector]:
     """Return where the pair at p[o:] meets in the place of the row at p[row:], and the frame across its normal."""
-    one, two = o + layout.FIRST, o + layout.SECOND
+    one = o + layout.FIRST
     if int(p[one].real) == layout.PLANE:
-        return _lowest(p, w, two, row, axis(p, w, one, 2)), axis(p, w, one, 0), axis(p, w, one, 1)
-    C = origin(p, w, one)
-    D = apart(origin(p, w, two), C)
-    n = _spread(D, root(dot(D, D)))
-    first, second = _frame(p, w, two, n)
-    return moved(C, p[one + layout.SIZE], n), first, second
+        return _over_plane(p, w, o, row, axis(p, w, one, 2)), axis(p, w, one, 0), axis(p, w, one, 1)
+    x, n = _between(p, w, o, int(p[row + layout.PLACE].real))
+    first, second = _frame(p, w, o + layout.SECOND, n)
+    return x, first, second
 
 
 @kernels.helper

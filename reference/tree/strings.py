@@ -19,8 +19,8 @@ END = 4  # numbers of one end
 def between(p: Array, o: int, w: Array) -> Any:
     """Return the distance of the second end at p[o:] from the first as a jet, and its direction."""
     one, two = apart(p, w, o, o + END)
-    d, n = solids.point(two, one)
-    return d, n
+    d, D, length = solids.point(two, one)
+    return d, solids.unit(D, length)
 
 
 @kernels.helper

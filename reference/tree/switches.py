@@ -12,9 +12,11 @@ from crossbody.reference.kernels import CHANGED, GIVEN, START, TOUCHED, UNCHANGE
 from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.tree import balls, kinks, layout, sweeps
-from crossbody.reference.tree.pair_rows import chosen, lowest, touch, turn, upside_down
+from crossbody.reference.tree import pair_slip as slip
+from crossbody.reference.tree.pair_rows import axis, cap, chosen, lowest, touch, turn, upside_down
 
-FREE, CONTACT = 0, 1  # modes, as in crossbody.cases.Mode
+FREE = 0  # a mode, as in crossbody.cases.Mode
+ASIDE = 1e-2  # rad, from where a load leans to the first point on which a cylinder stands
 
 
 @kernels.helper
@@ -59,15 +61,43 @@ def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
 
 
 @kernels.helper
+def _rubs(p: Floats, o: int) -> bool:
+    """Return whether the pair at p[o:] has friction."""
+    for i in range(int(p[layout.ROWS])):
+        row = int(p[layout.AT_ROW]) + layout.ROW * i
+        at = int(p[layout.AT_PAIR]) + pairs.PAIR * int(p[row + pairs.WHICH])
+        if int(p[row]) == layout.TANGENT and at == o:
+            return True
+    return False
+
+
+@kernels.helper
+def _leans(p: Floats, w: Floats, o: int) -> float:
+    """Return the angle about a cylinder's axis to which its load leans at the start: as it slides, or else downhill.
+
+    A load that comes to the rim finds a point there, and not so near that the points beside it neither bear nor part.
+    """
+    two = o + pairs.SECOND
+    E, X, Y = cap(p, w, two, upside_down(p, w, o)), axis(p, w, two, 0), axis(p, w, two, 1)
+    x, y = slip.velocity(p, w, o, E, X)[0], slip.velocity(p, w, o, E, Y)[0]
+    if x == 0.0 and y == 0.0:
+        for k in range(3):
+            x, y = x + p[layout.GRAVITY + k] * X[k][0], y + p[layout.GRAVITY + k] * Y[k][0]
+    return float(np.arctan2(y, x) + ASIDE) if x != 0.0 or y != 0.0 else lowest(p, w, o)
+
+
+@kernels.helper
 def _stand(p: Floats, w: Floats, o: int, i: int, mode: Bytes, before: int) -> None:
     """Hand over between lowest and highest points of a cylinder's caps and the points of its rim.
 
     The points count from the lowest one, so that the opposite one is the highest: what rocks in a plane feels nothing.
+    Of one with friction that stands at the start they count from where its load leans to.
     """
     k = int(p[layout.AT_SIDE])
     now = int(p[k + int(p[o + pairs.LIES])])
     if now != pairs.CROSSED:
-        p[k + int(p[o + pairs.PHASE])] = lowest(p, w, o)
+        leans = before == pairs.UNDECIDED and _rubs(p, o)
+        p[k + int(p[o + pairs.PHASE])] = _leans(p, w, o) if leans else lowest(p, w, o)
     if before == pairs.CROSSED:
         cap = i + (0 if now == pairs.ALONG else 2)
         low, high = mode[cap], mode[cap + 1]
@@ -98,7 +128,7 @@ def _lie(p: Floats, w: Floats, o: int, i: int, mode: Bytes) -> None:
     elif start:
         return
     elif p[k] == pairs.CROSSED:
-        if mode[i] == FREE or mode[i + 1] == CONTACT:
+        if mode[i] == FREE or mode[i + 1] in kinks.CLOSED:
             mode[i] = mode[i + 1]
         mode[i + 1] = FREE
     elif touch(p, w, o, row + layout.ROW)[0][0] < touch(p, w, o, row)[0][0]:

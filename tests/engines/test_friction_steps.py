@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import G, box_on_floor, sphere_on_floor, stack
+from friction_scenes import G, box_on_floor, rubbed, sphere_on_floor, stack
 from scipy.spatial.transform import Rotation
 
 from crossbody import cases, engines
@@ -119,6 +119,7 @@ def thrown() -> Iterator[tuple[str, Case]]:
         yield name, case_of(box, q0=[0, 0, 0.1, 1, 0, 0, 0], v0=[1.0, 0.5, 0, 0, 0, 0.5], t_end=0.02)
     ball = sphere_on_floor(0.3, 0.1, turn=0.7)
     yield "sphere", case_of(ball, q0=[0, 0, 0.1, 1, 0, 0, 0], v0=[1.0, 0.5, 0, 3, -5, 4], t_end=0.02)
+    yield from rubbed()
     stacked = stack(0.2, 0.3)
     at = [0, 0, 0.1, 1, 0, 0, 0, 0, 0, 0.3, 1, 0, 0, 0]
     yield "stack", case_of(stacked, q0=at, v0=[0.5, 0.2, 0, 0, 0, 0, -0.3, 0, 0, 0, 0, 0], t_end=0.02)
@@ -132,6 +133,9 @@ def test_multipliers_explain_the_motion(name: str, profile: str, thrown: Case) -
     Drake's one contact of a box as it comes is between corners where a face lies flat: no row tells its torque.
     """
     if (name, profile) == ("drake", "default") and len(thrown.contacts) > 3:
+        return
+    if (name == "dart") and (why := engine(name).why_not(thrown, profile)):
+        assert "cylinder" in why or "FCL's detector takes the capsule" in why
         return
     found = ran(name, profile, thrown, dt=1e-4)
     system, worst, largest = system_of(thrown), 0.0, 0.0

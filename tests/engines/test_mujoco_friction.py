@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from friction_scenes import G, box_on_floor, sphere_on_floor, stack
+from friction_scenes import G, box_on_floor, rubbed, sphere_on_floor, stack
 from scipy.spatial.transform import Rotation
 
 from crossbody import cases, engines
@@ -92,6 +92,15 @@ def test_spheres_that_rub_push_along_the_frame_of_their_rows(order: int) -> None
     found = run(case, "default", dt=1e-4)
     some = np.flatnonzero(found.lam[:-1].any(axis=1))[::5]
     assert len(some) > 5
+    assert unexplained(case, found, some) < 1e-2
+
+
+@pytest.mark.parametrize("case", [pytest.param(case, id=name) for name, case in rubbed()])
+def test_solids_that_rub_push_along_the_frame_of_their_rows(case: Case) -> None:
+    found = run(case, "default", dt=1e-4)
+    some = np.flatnonzero(found.lam[:-1].any(axis=1))[::5]
+    assert len(some) > 5
+    assert np.abs(found.lam[:, len(case.contacts) // 3 :]).max() > 1.0
     assert unexplained(case, found, some) < 1e-2
 
 

@@ -13,17 +13,18 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, Outcome
 from crossbody.cases.files.contacts import _why
+from crossbody.cases.scene_contacts import unknown
 from crossbody.reports.runs import choice, jobs
 
 GATE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody>
-  <geom name="wall" type="box" pos="{wall} 0 0" size="{half} 1 1"/>
+  <geom name="wall" type="box" condim="4" pos="{wall} 0 0" size="{half} 1 1"/>
   <body name="ball" pos="{start} 0 0"><joint type="slide" axis="{axis}"/>
     <joint type="hinge" axis="0 0 1"/><geom name="ball" size="{radius}" mass="1"/></body>
   </worldbody><keyframe><key name="thrown" qvel="{speed} 0"/></keyframe></mujoco>"""
 
 
 def gate(folder: Path, **numbers: float | str) -> str:
-    """Return a file of a ball that moves along x towards a wall whose friction no row stands for."""
+    """Return a file of a ball that moves along x towards a wall whose friction, which spins, no row stands for."""
     given = {"gravity": 0.0, "wall": 0.0, "half": 1e-3, "start": -1.0, "axis": "1 0 0", "radius": 1e-3, "speed": 0.0}
     path = folder / "gate.xml"
     path.write_text(GATE.format(**(given | numbers)), encoding="utf-8")
@@ -57,18 +58,26 @@ def test_a_motion_that_passes_beside_it_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_friction_is_a_reason_where_the_contact_has_it(seed: int) -> None:
+def test_friction_is_a_reason_where_the_contact_has_it(seed: int, tmp_path: Path) -> None:
     """By MuJoCo's own contacts, whatever the shapes' priorities."""
     rng = np.random.default_rng(seed)
-    dims, priorities = rng.choice([1, 1, 3], 2), rng.integers(0, 2, 2)
+    dims, priorities = rng.choice([1, 1, 3, 4, 6], 2), rng.integers(0, 2, 2)
     balls = "".join(
         f'<body pos="{0.15 * k} 0 0"><freejoint/><geom size="0.1" condim="{dim}" priority="{first}"/></body>'
         for k, (dim, first) in enumerate(zip(dims, priorities, strict=True))
     )
-    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
+    path = tmp_path / "balls.xml"
+    path.write_text(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
+    model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    assert ("friction" in _why(model, (0, 1))) == (int(data.contact.dim[0]) > 1)
+    dim = int(data.contact.dim[0])
+    rolls = "spins or rolls" if dim > 3 else ""
+    for friction, told in ((0, rolls or ("friction is left out" if dim > 1 else "")), (1, rolls)):
+        scene = cases.from_file(str(path), friction=friction).scene
+        assert scene is not None
+        assert told in _why(model, (0, 1), unknown(scene))
+        assert bool(told) == bool(unknown(scene))
 
 
 def test_a_hull_without_friction_has_too_many_corners() -> None:
@@ -77,4 +86,4 @@ def test_a_hull_without_friction_has_too_many_corners() -> None:
         f'<mujoco><asset><mesh name="ball" vertex="{points}"/></asset><worldbody><geom type="plane" size="1 1 1" '
         'condim="1"/><body><freejoint/><geom type="mesh" mesh="ball" condim="1"/></body></worldbody></mujoco>'
     )
-    assert _why(model, (0, 1)).startswith("the hull has more than 256 corners")
+    assert _why(model, (0, 1), {}).startswith("the hull has more than 256 corners")

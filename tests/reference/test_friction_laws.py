@@ -15,6 +15,7 @@ from friction_scenes import (
     account,
     box_on_floor,
     linear,
+    piled,
     point,
     random_problem,
     rod_on_floor,
@@ -26,6 +27,7 @@ from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import RowLaw, Scene
+from crossbody.cases.scene_contacts import PLACES
 from crossbody.reference import System, simulate
 from crossbody.reference.tree.system import system
 
@@ -49,6 +51,25 @@ def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
 )
 def test_cones_power_and_energy_of_bodies_with_edges(seed: int) -> None:
     scene, q0, v0, mu = tossed(seed, EDGED, 1)
+    run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=150_000)
+    assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), run_.message
+    obeys(scene, run_, mu, 1e-6)
+
+
+@pytest.mark.parametrize("size", [(0.1, 0.15, 0.0), (0.15, 0.02, 0.0)], ids=["can", "coin"])
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 60))])
+def test_cones_power_and_energy_of_tossed_cans(seed: int, size: tuple[float, ...]) -> None:
+    """They land on a rim, roll round on it, rock from side to side, stand or roll on their side."""
+    scene, q0, v0, mu = tossed(seed, {"cylinder": size}, 1)
+    run_ = run(scene, q0, v0, 2.0, rtol=1e-6, max_steps=150_000)
+    assert run_.outcome is Outcome.FINISHED, run_.message
+    obeys(scene, run_, mu, 1e-6)
+
+
+@pytest.mark.parametrize("kinds", [types for types in PLACES if "plane" not in types], ids=":".join)
+@pytest.mark.parametrize("seed", [*range(2), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 30))])
+def test_cones_power_and_energy_of_piled_solids(seed: int, kinds: tuple[str, str]) -> None:
+    scene, q0, v0, mu = piled(seed, kinds)
     run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=150_000)
     assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), run_.message
     obeys(scene, run_, mu, 1e-6)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import account, linear, random_problem, rod_on_floor, run, tossed
+from friction_scenes import account, linear, piled, random_problem, rod_on_floor, run, tossed
 
 from crossbody import cases, engines
 from crossbody.cases import Mode, Outcome, Tier, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import RowLaw
+from crossbody.cases.scene_contacts import PLACES
 from crossbody.reference import simulate
 from crossbody.reports.judging.truth import truth_of
 
@@ -24,6 +26,7 @@ NAMES = (
 )  # fmt: skip
 OTHERS = [(name, variant) for name in NAMES for variant in cases.variants(name) if (name, variant) not in QUICK]
 STATE, TIME = 1e-8, 1e-9
+SOLIDS = [types for types in PLACES if "plane" not in types and types != ("sphere", "box")]
 
 
 def events(run_: Trajectory) -> list[tuple[int, Mode, Mode]]:
@@ -60,6 +63,24 @@ def test_both_machines_move_tossed_bodies_alike(seed: int) -> None:
     assert events(one) == events(other)
     assert np.abs(times(one) - times(other)).max(initial=0.0) < 1e-8
     assert account(other) < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("make", "kinds"),
+    [(tossed, {"cylinder": (0.1, 0.15, 0.0)}), (piled, ("sphere", "box")),
+     *(pytest.param(piled, kinds, marks=pytest.mark.slow) for kinds in SOLIDS)],
+)  # fmt: skip
+def test_both_machines_move_cans_and_solids_alike(make: Any, kinds: Any) -> None:
+    """They share the rows, and neither modes nor events."""
+    given = (2, kinds, 1) if make is tossed else (0, kinds)
+    scene, q0, v0, _ = make(*given)
+    at = np.linspace(0.0, 0.3, 61)
+    one = run(scene, q0, v0, 0.3, rtol=1e-11, samples=at)
+    other = run(scene, q0, v0, 0.3, rtol=1e-9, samples=at, solver="cvode")
+    assert one.outcome is other.outcome is Outcome.FINISHED, other.message
+    assert np.abs(one.q - other.q).max() < STATE
+    assert events(one) == events(other)
+    assert len(one.events) > 1
 
 
 @pytest.mark.parametrize("mu", [0.5, 2.0])

@@ -48,19 +48,25 @@ class Frame:
         return self.v + np.cross(self.w, np.asarray(x) - self.p)
 
 
+def told(found: Any) -> Any:
+    """Return a distance and the direction along which it is."""
+    d, D, length = found
+    return d, solids.unit(D, length)
+
+
 def segments(t: Any, one: Frame, two: Frame) -> Any:
     (M, (_, _, A)), (N, (_, _, B)) = one.at(t), two.at(t)
     K, L = solids.segments(M, A, SIZE[1], N, B, LONG)
-    return *solids.point(L, K), solids.value(K)
+    return *told(solids.point(L, K)), solids.value(K)
 
 
 SIZE, LONG = np.array([0.31, 0.43, 0.57]), 0.61
 GEOM = mujoco.mjtGeom
 SOLIDS: dict[str, tuple[Any, Any, float, Callable[..., Any]]] = {
-    "point": (GEOM.mjGEOM_SPHERE, [0.3, 0, 0], 0.3, lambda C, M, X: solids.point(C, M)),
-    "capsule": (GEOM.mjGEOM_CAPSULE, SIZE, SIZE[0], lambda C, M, X: solids.segment(C, M, X[2], SIZE[1])),
-    "box": (GEOM.mjGEOM_BOX, SIZE, 0.0, lambda C, M, X: solids.box(C, M, *X, tuple(SIZE))),
-    "cylinder": (GEOM.mjGEOM_CYLINDER, SIZE, 0.0, lambda C, M, X: solids.cylinder(C, M, X[2], SIZE[0], SIZE[1])),
+    "point": (GEOM.mjGEOM_SPHERE, [0.3, 0, 0], 0.3, lambda C, M, X: told(solids.point(C, M))),
+    "capsule": (GEOM.mjGEOM_CAPSULE, SIZE, SIZE[0], lambda C, M, X: told(solids.segment(C, M, X[2], SIZE[1]))),
+    "box": (GEOM.mjGEOM_BOX, SIZE, 0.0, lambda C, M, X: told(solids.box(C, M, *X, tuple(SIZE)))),
+    "cylinder": (GEOM.mjGEOM_CYLINDER, SIZE, 0.0, lambda C, M, X: told(solids.cylinder(C, M, X[2], *SIZE[:2]))),
 }
 
 
@@ -118,11 +124,11 @@ def test_shapes_whose_middles_meet_have_no_direction_in_real_and_complex_kernels
     two.p = one.p
     N, (_, _, B) = two.at(0.0 * kind)
     K, L = solids.segments(M, A, SIZE[1], N, B, LONG)
-    for d, n in (solids.point(M, M), solids.segment(M, M, A, SIZE[1]), solids.point(L, K)):
+    for d, n in map(told, (solids.point(M, M), solids.segment(M, M, A, SIZE[1]), solids.point(L, K))):
         assert d[0] == 0.0
         assert np.isnan(d[1:]).all()
         assert np.isnan(n).all()
-    d, n = solids.cylinder(M, M, A, SIZE[0], 3.0 * SIZE[0])
+    d, n = told(solids.cylinder(M, M, A, SIZE[0], 3.0 * SIZE[0]))
     assert d[0] == -SIZE[0]
     assert np.isnan(n).all()
 
@@ -161,7 +167,7 @@ def test_capsules_side_by_side_part_where_they_end(sine: float) -> None:
             def gap(t: Any, one: Frame = one, two: Frame = two, half: float = half, sign: float = sign) -> Any:
                 (M, (_, _, A)), (N, (_, _, B)) = one.at(t), two.at(t)
                 K, L = solids.ends(M, A, half, N, B, LONG, sign)
-                return *solids.point(L, K), solids.value(K)
+                return *told(solids.point(L, K)), solids.value(K)
 
             d, n, K = gap(0.0)
             met = np.array(K) + d[0] * np.array(n)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from crossbody.cases import Trajectory
+from crossbody.cases import Case, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Pair, Push, RowLaw, Scene, Shape, Tendon
 from crossbody.reference import System, kernels, simulate
@@ -20,6 +21,7 @@ PLANAR = (("x", (1, 0, 0), "slide"), ("z", (0, 0, 1), "slide"), ("turn", (0, 1, 
 HALF = (0.2, 0.15, 0.1)
 ROUND = {"sphere": (0.1, 0.0, 0.0), "ellipsoid": (0.2, 0.15, 0.1)}
 EDGED = {"box": (0.2, 0.15, 0.1), "capsule": (0.05, 0.2, 0.0)}
+SOLID = {"sphere": (0.1, 0, 0), "box": (0.2, 0.15, 0.1), "cylinder": (0.15, 0.1, 0), "capsule": (0.08, 0.2, 0)}
 HEAVIEST = 2.0  # kg
 
 
@@ -83,6 +85,30 @@ def stack(mu1: float, mu2: float, m1: float = 2.0, m2: float = 1.0) -> Scene:
     )  # fmt: skip
 
 
+def rubbed() -> Iterator[tuple[str, Case]]:
+    """Yield a ball on solids, capsules across each other, and a wheel: name and case."""
+    turn, aside = Rotation.from_euler("xyz", [0.3, -0.4, 0.2]), (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
+    ball = sphere_on_floor(0.4, 0.1)
+    rod = Shape(
+        name="sphere", body="sphere", type="capsule", size=(0.1, 0.2, 0), orientation=(aside[0], aside[0], 0, 0)
+    )
+    solids = {"box": (0.4, 0.3, 0.2), "cylinder": (0.2, 0.5, 0.0), "capsule": (0.2, 0.5, 0.0)}
+    for kind, size in solids.items():
+        lies = aside if kind != "box" else (1.0, 0.0, 0.0, 0.0)
+        lower = Shape(name="floor", type=kind, size=size, orientation=tuple(
+            (turn * Rotation.from_quat(lies, scalar_first=True)).as_quat(scalar_first=True).tolist()))  # fmt: skip
+        for upper in (ball.shapes[1], rod) if kind == "capsule" else (ball.shapes[1],):
+            q0 = [*turn.apply([0.05, 0.0, 0.2999]), *turn.as_quat(scalar_first=True)]
+            case = case_of(ball.replace(shapes=(lower, upper)), q0=q0, v0=[1.0, 0.5, 0, 3, -5, 4], t_end=0.02)
+            yield f"{upper.type} on {kind}", case
+    can = Shape(name="sphere", body="sphere", type="cylinder", size=(0.1, 0.05, 0.0), orientation=(*rod.orientation,))
+    lean = Rotation.from_euler("x", 0.4)  # on a rim, of which the lowest point goes round
+    low = 0.1 * np.cos(0.4) + 0.05 * np.sin(0.4)
+    wheel = ball.replace(shapes=(ball.shapes[0], can))
+    q0 = [0, 0, low, *lean.as_quat(scalar_first=True)]
+    yield "wheel on its rim", case_of(wheel, q0=q0, v0=[1.0, 0.5, 0, 0, 8.0, 4.0], t_end=0.02)
+
+
 def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int = 3) -> Any:
     """Return bodies tossed onto a floor, two spheres among them that may meet, their start and mu."""
     sizes = ROUND | first
@@ -100,6 +126,26 @@ def tossed(seed: int, first: Mapping[str, tuple[float, ...]] = ROUND, most: int 
     pairs += [pair(f"s{i}", f"s{i + 1}", mu, law) for i in range(1, len(kinds) - 1)]
     joints = tuple(Joint(name=body.name, body=body.name, type="free") for body in bodies)
     scene = Scene(bodies=tuple(bodies), joints=joints, shapes=tuple(shapes), pairs=tuple(pairs))
+    return scene, np.array(q), np.array(v), mu
+
+
+def piled(seed: int, kinds: tuple[str, str]) -> Any:
+    """Return a body that falls onto another one, which falls onto a floor, their start and mu; all rub."""
+    rng = np.random.default_rng(seed)
+    mu, law = float(rng.uniform(0.0, 1.0)), RowLaw(a0=float(10 ** rng.uniform(3, 4.5)), a1=float(rng.uniform(5, 200)))
+    names, q, v = ("up", "low"), list[float](), list[float]()
+    for height in (0.75, 0.3):
+        turn = rng.normal(size=4)
+        q += [*(0.03 * rng.normal(size=2)), height, *(turn / np.linalg.norm(turn))]
+        v += [*(0.5 * rng.normal(size=2)), -1.0, *(4.0 * rng.normal(size=3))]
+    scene = Scene(
+        bodies=tuple(box_body(name, HALF, float(rng.uniform(0.5, HEAVIEST))) for name in names),
+        joints=tuple(Joint(name=name, body=name, type="free") for name in names),
+        shapes=(Shape(name="floor", type="plane"), *(
+            Shape(name=name, body=name, type=kind, size=SOLID[kind]) for name, kind in zip(names, kinds, strict=True)
+        )),
+        pairs=(pair("floor", "up", mu, law), pair("floor", "low", mu, law), pair("up", "low", mu, law)),
+    )  # fmt: skip
     return scene, np.array(q), np.array(v), mu
 
 
