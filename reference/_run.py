@@ -73,7 +73,8 @@ class CompiledRun:
 
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         self.system, self.options = system, options
-        # First: while it is compiled another process compiles what the rest asks for.
+        if system.frictional:
+            friction_code()  # first: another process may still be compiling the loop
         self.call = entry(tuple(system.kernels.values()))
         self.start_state = np.concatenate([q0, v0])
         samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)
