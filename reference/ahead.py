@@ -54,8 +54,7 @@ def meanwhile(name: str) -> None:
     """
     from crossbody.reference._program import is_missing
 
-    begin()
-    if is_missing():
+    if begin.cache_info().currsize and is_missing():
         compile_piece(name)
 
 
