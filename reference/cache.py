@@ -39,6 +39,7 @@ _SETTINGS = (
     "CPU_NAME", "CPU_FEATURES", "FULL_TRACEBACKS", "LLVM_PASS_TIMINGS",
 )  # fmt: skip
 
+OURS = "crossbody.reference."
 ALLOCATES_NOTHING = ("crossbody.reference.core.", "crossbody.reference.sundials.compiled.")
 """The modules whose compiled functions make no arrays: numba refuses one that would."""
 
@@ -100,7 +101,8 @@ class Compiled(Lean):
             key = self._cache.key(name, sig)
             if store.has(key):
                 return super().compile(sig)
-            ahead.begin()
+            if _home(self.py_func).startswith(OURS):
+                ahead.begin()
             with store.alone(key), hastened():
                 return super().compile(sig)
 
@@ -160,6 +162,11 @@ class Compiled(Lean):
                 return self.overloads[wanted].entry_point
         self._types_active_call.clear()
         return self._explain_matching_error(*args, **kws)
+
+
+def _home(function: Any) -> str:
+    """Return the module of a function; what `exec` makes may have none."""
+    return function.__module__ or ""
 
 
 def _has_home(function: Any) -> bool:
@@ -312,7 +319,7 @@ def compiled(
     if numba_config.DISABLE_JIT:
         return function
     options = {"error_model": "numpy", "nogil": nogil} | ({"boundscheck": True} if debugging() else {})
-    if function.__module__.startswith(ALLOCATES_NOTHING):
+    if _home(function).startswith(ALLOCATES_NOTHING):
         options["_nrt"] = False  # references are not counted, which is a sixth of the code to compile
     if not signatures and not lazy:
         return Part(function, options)

@@ -12,9 +12,10 @@ from numba import float64, void
 from numba.core.errors import NumbaRuntimeError
 from numba.core.types.functions import BaseFunction
 
-from crossbody.reference import _program, ahead, code_store
+from crossbody.reference import _program, ahead, code_store, kernels
 from crossbody.reference._hastened import hastened
 from crossbody.reference.cache import ALLOCATES_NOTHING, compiled
+from crossbody.reference.systems import absent
 
 
 def doubled(x: float) -> float:
@@ -44,7 +45,8 @@ def test_the_loop_is_begun_with_the_first_code_that_is_compiled_and_not_where_it
     count = []
     for _ in range(2):
         ahead.begin.cache_clear()
-        assert compiled(doubled, [float64(float64)])(2.0) == 4.0
+        assert compiled(doubled, [float64(float64)])(2.0) == 4.0  # a user's own code begins nothing
+        compiled(absent.gaps.py_func, [kernels.REAL["gaps"]])
         count.append(len(begun))
     assert count == [1, 1]
 
