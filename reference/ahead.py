@@ -47,7 +47,7 @@ def begin() -> None:
 
 
 def meanwhile(name: str) -> None:
-    """Compile a piece that will be needed, rather than wait for those that another process compiles.
+    """Compile a piece that will be needed, rather than wait for those that another process may be compiling.
 
     Args:
         name: of `PIECES`.

@@ -68,6 +68,8 @@ def test_it_is_begun_where_a_processor_is_free_and_said_at_once(
 
 def test_nothing_is_begun_where_the_loop_is_kept(begun: list[list[str]]) -> None:
     _program.program()
+    begun.clear()
+    ahead.begin.cache_clear()
     ahead.begin()
     assert begun == []
 
@@ -86,6 +88,9 @@ def test_a_piece_is_compiled_here_only_while_another_process_compiles_the_loop(
     pieces: list[str] = []
     monkeypatch.setattr(_program, "is_missing", lambda: missing)
     monkeypatch.setattr(ahead, "compile_piece", pieces.append)
+    ahead.meanwhile("SUNDIALS")
+    assert pieces == []  # where nothing was compiled nothing is missing
+    ahead.begin()
     ahead.meanwhile("SUNDIALS")
     assert pieces == ["SUNDIALS"] * missing
 
