@@ -73,8 +73,9 @@ class CompiledRun:
 
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         self.system, self.options = system, options
-        if system.frictional:
-            friction_code()  # first: another process may still be compiling the loop
+        if system.frictional:  # this and modes first: another process may still be compiling the loop
+            friction_code()
+        instant_code()
         self.call = entry(tuple(system.kernels.values()))
         self.start_state = np.concatenate([q0, v0])
         samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)
