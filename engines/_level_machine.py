@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
@@ -65,6 +64,8 @@ def least_push(G: Floats, demand: Floats) -> Floats:
     E = np.vstack([(ways * np.sqrt(np.maximum(values, 0.0))).T, demand / size])
     goal = np.zeros(len(E))
     goal[-1] = 1.0
+    from scipy.optimize import nnls  # which takes longer to import than most runs
+
     found, _ = nnls(E, goal)
     lam: Floats = size * found / max(1.0 - float(E[-1] @ found), ULP)
     return lam

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -98,17 +97,11 @@ def by_name(message: str, contacts: Sequence[str]) -> str:
 
 def within_the_model(case: Case, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
-    from crossbody.cases.files.contacts import first_contact
-    from crossbody.cases.files.reading import model_of
-    from crossbody.cases.scene_contacts import contacts, inert, unknown
+    from crossbody.cases.files.contacts import meeting
 
-    model = model_of(Path(case.file), str(case.parameters.get("without", "")))
-    pairs = () if case.scene is None else (*(one.pair for one in contacts(case.scene)), *inert(case.scene))
-    known = {frozenset((pair.first, pair.second)) for pair in pairs}
-    rubs = {} if case.scene is None else unknown(case.scene)
     looked = run.outcome in (Outcome.FINISHED, Outcome.TIME_LIMIT)
-    found = first_contact(model, run.t, run.q, run.v, known, rubs) if looked else ""
-    return replace(run, outcome=Outcome.INCONSISTENT, message=found) if found else run
+    found = meeting(case, run.t, run.q, run.v) if looked else None
+    return replace(run, outcome=Outcome.INCONSISTENT, message=found.told) if found else run
 
 
 class Reference(Engine):

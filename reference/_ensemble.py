@@ -23,26 +23,11 @@ from crossbody.cases.control import Control
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference import kernels
 from crossbody.reference._check import check_once
-from crossbody.reference._program import (
-    ADDRESSES,
-    advance,
-    advance_address,
-    bound,
-    control,
-    dynamics,
-    energy,
-    gaps,
-    power,
-    rows,
-    solve,
-    switch,
-    velocity,
-    watch,
-)  # fmt: skip
+from crossbody.reference._program import advance, advance_address, bound
 from crossbody.reference._run import OUTCOMES, CompiledRun
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.bundles import TABLE
+from crossbody.reference.core.bundles import ADDRESSES, TABLE
 from crossbody.reference.core.layout import MORE, STATE, open_buffers, open_model, open_work
 from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.options import Chosen, Options, checked
@@ -217,10 +202,7 @@ def _runs(at, first, last, template, state, model, work, buffers, p, laws, start
             z.fill(0.0)
         code = MORE
         while code == MORE and s.steps < limit:
-            code = go(
-                dynamics(at[0]), gaps(at[1]), rows(at[2]), energy(at[3]), power(at[4]), velocity(at[5]), solve(at[6]),
-                control(at[7]), watch(at[8]), switch(at[9]), state, model, work, buffers, min(SLICE, limit - s.steps),
-            )  # fmt: skip
+            code = go(at, state, model, work, buffers, min(SLICE, limit - s.steps))
         out[r, 0] = s.t
         for i in range(len(w.y)):
             out[r, 1 + i] = w.y[i]

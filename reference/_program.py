@@ -13,36 +13,40 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import cgutils, types
+from numba.core import types
 from numba.extending import intrinsic
 
 from crossbody.reference import kernels
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import advance as core
-from crossbody.reference.core.bundles import TABLE
-from crossbody.reference.core.layout import BUFFERS, MODEL, STATE, WORK
+from crossbody.reference.core.bundles import ADDRESSES, TABLE, function_at
+from crossbody.reference.core.layout import BUFFERS, KERNELS, MODEL, STATE, WORK
+
+_STATE = numba.typeof(np.zeros(1, STATE))
+_ADVANCE = types.int64(ADDRESSES, _STATE, TABLE, TABLE, TABLE, types.int64)
 
 
-def _state() -> Any:
-    return numba.typeof(np.zeros(1, STATE))
-
-
-def _signature() -> Any:
-    functions = [kernels.function_type(name) for name in kernels.NAMES]
-    return types.int64(*functions, _state(), TABLE, TABLE, TABLE, types.int64)
+@cache
+def _declared() -> Any:
+    return compiled(core.advance, lazy=[_ADVANCE])
 
 
 @cache
 def program() -> Any:
     """The function `advance`, from the cache or compiled (once per installation)."""
-    from crossbody.reference.ahead import begin
+    found = _declared()
+    found.compile(_ADVANCE)
+    found.disable_compile()
+    return found
 
-    return compiled(core.advance, [_signature()], beside=begin)
+
+def is_missing() -> bool:
+    """Whether that would be compiled, and kept."""
+    return bool(_declared().lacks(_ADVANCE))
 
 
-_FRICTION = types.float64(types.int64, _state().dtype, MODEL, WORK, types.int64)
-_KERNELS = types.NamedTuple([kernels.function_type(name) for name in kernels.NAMES], core.Kernels)
-_INSTANT = types.int64(types.int64, _KERNELS, _state().dtype, MODEL, WORK, BUFFERS)
+_FRICTION = types.float64(types.int64, _STATE.dtype, MODEL, WORK, types.int64)
+_INSTANT = types.int64(types.int64, KERNELS, _STATE.dtype, MODEL, WORK, BUFFERS)
 
 
 @cache
@@ -67,9 +71,6 @@ def instant_code() -> int:
     return _code("instant_answers", _INSTANT)
 
 
-ADDRESSES = types.int64[::1]
-
-
 def at_address(signature: Any) -> Any:
     """Return what makes a function of an address, in compiled code: it is called as from C."""
     kind = types.FunctionType(signature)
@@ -77,9 +78,7 @@ def at_address(signature: Any) -> Any:
     @intrinsic
     def function(typingctx: Any, address: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, args: Any) -> Any:
-            made = cgutils.create_struct_proxy(kind)(context, builder)
-            made.c_addr = builder.inttoptr(args[0], cgutils.voidptr_t)
-            return made._getvalue()
+            return function_at(context, builder, kind, args[0])
 
         return kind(types.int64), generate
 
@@ -92,42 +91,22 @@ def address(function: Any, signature: Any) -> int:
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_cfunc_wrapper_name))
 
 
-def bound(call: Any, names: Sequence[str], functions: Sequence[Any], program: int) -> Callable[..., Any]:
+def bound(call: Any, names: Sequence[str], functions: Sequence[Any], *programs: int) -> Callable[..., Any]:
     """Return compiled code with its first argument: the addresses of kernels, and behind them of what they are for."""
     found = [address(function, kernels.REAL[name]) for name, function in zip(names, functions, strict=True)]
-    made = partial(call, np.array([*found, program]))
+    made = partial(call, np.array([*found, *programs]))
     made.functions = tuple(functions)  # type: ignore[attr-defined]  # whose code stands there
     return made
 
 
-dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch = map(at_address, kernels.REAL.values())
-advance = at_address(_signature())
-
-
-def _go(at, state, model, work, buffers, budget):  # type: ignore[no-untyped-def]
-    call = advance(at[10])
-    return call(
-        dynamics(at[0]), gaps(at[1]), rows(at[2]), energy(at[3]), power(at[4]), velocity(at[5]), solve(at[6]),
-        control(at[7]), watch(at[8]), switch(at[9]), state, model, work, buffers, budget,
-    )  # fmt: skip
-
-
-@cache
-def _going() -> Any:
-    """That program as it is called from Python."""
-    return compiled(_go, [types.int64(ADDRESSES, _state(), TABLE, TABLE, TABLE, types.int64)])
-
-
-def compile_loop() -> None:
-    """Have the loop ready, from the cache or compiled."""
-    program(), _going()
+advance = at_address(_ADVANCE)
 
 
 def advance_address() -> int:
     """Return where the program stands, for other compiled code."""
-    return address(program(), _signature())
+    return address(program(), _ADVANCE)
 
 
 def entry(functions: Sequence[Any]) -> Callable[..., int]:
     """Return the program for one system's kernels: called with its tables and a number of steps."""
-    return bound(_going(), kernels.NAMES, functions, advance_address())
+    return bound(program(), kernels.NAMES, functions)

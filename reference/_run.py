@@ -73,7 +73,9 @@ class CompiledRun:
 
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         self.system, self.options = system, options
-        # First: while it is compiled another process compiles what the rest asks for.
+        if system.frictional:  # this and modes first: another process may still be compiling the loop
+            friction_code()
+        instant_code()
         self.call = entry(tuple(system.kernels.values()))
         self.start_state = np.concatenate([q0, v0])
         samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)

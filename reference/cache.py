@@ -29,14 +29,19 @@ from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from crossbody.reference import code_store
+from crossbody.reference import ahead, code_store
 from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values
+from crossbody.reference._hastened import hastened
 from crossbody.reference._parts import PartPasses, WholePasses, read_back
 
 _SETTINGS = (
     "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX", "DEBUGINFO_DEFAULT",
     "CPU_NAME", "CPU_FEATURES", "FULL_TRACEBACKS", "LLVM_PASS_TIMINGS",
 )  # fmt: skip
+
+OURS = "crossbody.reference."
+ALLOCATES_NOTHING = ("crossbody.reference.core.", "crossbody.reference.sundials.compiled.")
+"""The modules whose compiled functions make no arrays: numba refuses one that would."""
 
 FORMAT = "2"
 """What `save_overload` writes; another number for every change of it."""
@@ -69,16 +74,15 @@ class Compiled(Lean):
         locals: types of its variables, for numba.
         targetoptions: of numba.
         declared: the only signatures that it may be compiled for; those of a call if none are given.
-        beside: called before it is compiled, not where it is read back.
     """
 
     def __init__(
         self, function: Callable[..., Any], locals: Any = None, targetoptions: Any = None,
-        *, declared: Sequence[Any] = (), beside: Callable[[], None] | None = None,
+        *, declared: Sequence[Any] = (),
     ) -> None:  # fmt: skip
         super().__init__(function, locals, {"nopython": True, **(targetoptions or {})}, pipeline_class=WholePasses)
         self._cache = _Overloads(self)
-        self.declared, self.beside = {tuple(signature.args): signature for signature in declared}, beside
+        self.declared = {tuple(signature.args): signature for signature in declared}
 
     def compile(self, sig: Any) -> Any:
         """Compile for a signature, or read the code back."""
@@ -92,12 +96,21 @@ class Compiled(Lean):
             store = code_store.current() if name else None
             sig = self.declared.get(tuple(args), sig)
             if store is None:
-                return super().compile(sig)
+                with hastened():
+                    return super().compile(sig)
             key = self._cache.key(name, sig)
-            if self.beside is not None and not store.has(key):
-                self.beside()
-            with store.alone(key):
+            if store.has(key):
                 return super().compile(sig)
+            if _home(self.py_func).startswith(OURS):
+                ahead.begin()
+            with store.alone(key), hastened():
+                return super().compile(sig)
+
+    def lacks(self, sig: Any) -> bool:
+        """Whether code for a signature would be kept, and is not yet."""
+        with global_compiler_lock, self._marked() as name:
+            store = code_store.current() if name else None
+            return store is not None and not store.has(self._cache.key(name, sig))
 
     @contextmanager
     def _marked(self) -> Iterator[str]:
@@ -149,6 +162,11 @@ class Compiled(Lean):
                 return self.overloads[wanted].entry_point
         self._types_active_call.clear()
         return self._explain_matching_error(*args, **kws)
+
+
+def _home(function: Any) -> str:
+    """Return the module of a function; what `exec` makes may have none."""
+    return function.__module__ or ""
 
 
 def _has_home(function: Any) -> bool:
@@ -289,7 +307,6 @@ def compiled(
     *,
     lazy: Any = (),
     nogil: bool = False,
-    beside: Callable[[], None] | None = None,
 ) -> Any:
     """Compile a function and keep the code on disk.
 
@@ -298,14 +315,15 @@ def compiled(
         signatures: compiled for at once; without them the function is a part of those that call it.
         lazy: signatures that it is compiled for when they are first asked for.
         nogil: threads may run it side by side.
-        beside: called before it is compiled, not where it is read back.
     """
     if numba_config.DISABLE_JIT:
         return function
     options = {"error_model": "numpy", "nogil": nogil} | ({"boundscheck": True} if debugging() else {})
+    if _home(function).startswith(ALLOCATES_NOTHING):
+        options["_nrt"] = False  # references are not counted, which is a sixth of the code to compile
     if not signatures and not lazy:
         return Part(function, options)
-    found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy), beside=beside)
+    found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy))
     for signature in signatures:
         found.compile(signature)
     if signatures and not lazy:

@@ -37,9 +37,14 @@ SLOW_S = 6.0  # when a compilation is told: that of a kernel takes less
 _DAY = 86400.0
 
 
-@cache
+_told: set[str] = set()
+
+
 def tell(text: str) -> None:
     """Say a sentence on stderr, once a process."""
+    if text in _told:
+        return
+    _told.add(text)
     with suppress(OSError, ValueError, AttributeError):  # there may be no stderr
         sys.stderr.write(f"crossbody: {text}\n")
 
@@ -55,7 +60,7 @@ def base() -> Path | None:
         return None
 
 
-COMPILING = "compiling for this processor, once; the integrator takes about a minute."
+COMPILING = "compiling for this processor, once; it takes about half a minute."
 ADVICE = "CROSSBODY_CACHE names another folder."
 
 
@@ -204,7 +209,7 @@ class Store:
             if waited > WAIT_S:
                 tell(f"another process has held {path} for {waited:.0f} s; this one compiles for itself.")
                 return None
-            if waited > TELL_S:
+            if waited > TELL_S and COMPILING not in _told:
                 tell("another process compiles what this one needs; waiting for it.")
             time.sleep(LOOK_S)
         return None

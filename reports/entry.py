@@ -10,6 +10,7 @@ from types import FrameType
 def main() -> None:
     """Run the command `crossbody`."""
     signal.signal(signal.SIGINT, _leave)
+    os.environ.setdefault("MUJOCO_GL", "disable")  # nothing is drawn with it, and it would look for windows at length
     from crossbody.reports import cli
 
     try:

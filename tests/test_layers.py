@@ -94,3 +94,20 @@ def test_listing_imports_nothing_heavy(arguments: list[str]) -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "crossbody" in done.stdout or "bouncing_ball" in done.stdout or "Usage" in done.stdout
+
+
+NOT_FOR_ONE_RUN = ("pandas", "scipy.optimize", "scipy.sparse", "scipy.signal", "mujoco", "pinocchio", "pydrake")
+
+
+def test_one_run_and_its_page_import_what_they_use(tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom crossbody.reports.cli import main\n"
+        f"asked = ['run', 'bouncing_ball:listing', '-e', 'reference:compiled', '--out', {str(tmp_path / 'out')!r}]\n"
+        "try:\n    main(asked)\n"
+        "except SystemExit as end:\n    assert end.code == 0, end.code\n"
+        f"found = [name for name in {NOT_FOR_ONE_RUN!r} if name in sys.modules]\n"
+        "assert not found, found\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "index.html").exists()

@@ -5,23 +5,48 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Set
 from itertools import pairwise
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.case import Case
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.pairs import allowed
-from crossbody.cases.scene_contacts import PLACES
+from crossbody.cases.files.reading import model_of
+from crossbody.cases.scene_contacts import PLACES, contacts, inert, unknown
 
 APART, HALVINGS = 1e-3, 30
 """Longest time between two looks, s, and how often it is halved where two shapes have met in between."""
 
 
-def first_contact(
+class Meeting(NamedTuple):
+    """Two shapes without a row come within reach: when, s, and a sentence on it."""
+
+    t: float
+    told: str
+
+
+def meeting(case: Case, t: Floats, q: Floats, v: Floats) -> Meeting | None:
+    """Return the first of shapes of a file whose contacts no row stands for, if they meet.
+
+    Args:
+        case: of a file.
+        t: instants (n,), s.
+        q: positions there (n, nq).
+        v: velocities there (n, nv).
+    """
+    model = model_of(Path(case.file), str(case.parameters.get("without", "")))
+    pairs = () if case.scene is None else (*(one.pair for one in contacts(case.scene)), *inert(case.scene))
+    rubs = {} if case.scene is None else unknown(case.scene)
+    return _first(model, t, q, v, {frozenset((pair.first, pair.second)) for pair in pairs}, rubs)
+
+
+def _first(
     model: Any, t: Floats, q: Floats, v: Floats, known: Set[frozenset[str]], rubs: Mapping[frozenset[str], str]
-) -> str:
-    """Return a sentence on the first instant at which two shapes come within reach; empty if none do.
+) -> Meeting | None:
+    """Return the first instant at which two shapes come within reach, and a sentence on it; None if none do.
 
     Args:
         model: MuJoCo's, which knows the file's filters.
@@ -34,10 +59,10 @@ def first_contact(
     import mujoco
 
     if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT):
-        return ""
+        return None
     data, name = mujoco.MjData(model), mjcf.names(model, "geom")
     if all(frozenset((name(a), name(b))) in known for a, b in allowed(model)):
-        return ""
+        return None
 
     def met(position: Floats) -> tuple[int, ...]:
         data.qpos[:] = position
@@ -54,12 +79,13 @@ def first_contact(
                 sooner = met(position(half))
                 before, time, pair = (before, half, sooner) if sooner else (half, time, pair)
             both = " and ".join(_named(model, geom) for geom in pair)
-            return (
+            return Meeting(
+                time,
                 f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for them, because "
                 f"{_why(model, pair, rubs)}. {_advice(model, pair)}without=contacts leaves all contacts out, and a "
-                "shorter t_end ends before."
+                "shorter t_end ends before.",
             )
-    return ""
+    return None
 
 
 def _why(model: Any, pair: tuple[int, ...], rubs: Mapping[frozenset[str], str]) -> str:

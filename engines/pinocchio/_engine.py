@@ -9,7 +9,6 @@ from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
-import sksundae
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
@@ -31,6 +30,7 @@ from crossbody.engines.pinocchio._flow import Flow
 from crossbody.engines.pinocchio._impulse import RULES, Impact, ImpulseMachine, constants, restitution
 from crossbody.engines.pinocchio._rows import ALGEBRA
 from crossbody.engines.pinocchio._scene import Scene
+from crossbody.reference.sundials import solvers
 
 MECHANISMS = Registry("mechanism of Pinocchio", "crossbody.engines.pinocchio")
 STEPS = Parameter(default=200_000, doc="bound on the number of steps", low=1, high=1e9)
@@ -100,7 +100,7 @@ class Pinocchio(Engine):
         "impulse_simultaneous": "the same with all touching contacts struck at once, as a complementarity problem",
         "admm": "time stepping with ADMM, the LCP baseline: first order, restitution of the law's linear part",
     }
-    versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": sksundae.__version__}
+    versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": solvers.VERSION}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
     interpreted: Mapping[str, str] = {
         "*": "the loop over steps, the rows of the law, gaps; Pinocchio's algorithms are called from Python"

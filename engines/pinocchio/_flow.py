@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sksundae.cvode import CVODE
 
 from crossbody.cases import Mode, Outcome
 from crossbody.cases.arrays import Floats
@@ -20,6 +19,7 @@ from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._rows import ULP, PinRows
 from crossbody.engines.pinocchio._scene import World
 from crossbody.reference.sundials.quiet import quiet
+from crossbody.reference.sundials.solvers import CVODE
 
 PER_SOLVE = 100_000
 """Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -340,6 +339,8 @@ def none_pulling(lam: Floats, J: Floats, one_sided: Sequence[bool]) -> Floats:
     if size <= 0.0:
         return lam
     E, target = np.vstack([G.T, h / size]), np.append(np.zeros(free.shape[1]), 1.0)
+    from scipy.optimize import nnls  # which takes longer to import than most runs
+
     found, off = nnls(E, target)  # the least x with G x >= h: Lawson and Hanson 1974, ch. 23
     if off < NO_SUCH:
         return lam

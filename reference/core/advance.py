@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +53,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
     open_buffers,
+    open_kernels,
     open_model,
     open_work,
 )
@@ -62,21 +63,6 @@ from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
 JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
-
-
-class Kernels(NamedTuple):
-    """The functions of one mechanism."""
-
-    dynamics: Any
-    gaps: Any
-    rows: Any
-    energy: Any
-    power: Any
-    velocity: Any
-    solve: Any
-    control: Any
-    watch: Any
-    switch: Any
 
 
 @compiled
@@ -376,14 +362,11 @@ def _room(s: Any, b: Buffers) -> int:
     return EVENTS_FULL if journal.full(s, b) else DONE
 
 
-def advance(
-    dynamics: Any, gaps: Any, rows: Any, energy: Any, power: Any, velocity: Any, solve: Any, control: Any, watch: Any,
-    switch: Any, state: Any, model: Index, work: Index, buffers: Index, budget: int,
-) -> int:  # fmt: skip
+def advance(functions: Index, state: Any, model: Index, work: Index, buffers: Index, budget: int) -> int:
     """Go on for at most `budget` steps.
 
-    The ten kernels are the mechanism's, `state` is a record of `layout.STATE`, and model, work and buffers are the
-    tables of the bundles in `layout`.
+    `functions` has the addresses of the mechanism's kernels, `state` is a record of `layout.STATE`, and model, work and
+    buffers are the tables of the bundles in `layout`.
 
     Returns:
         DONE at the horizon, MORE after the budget, ROWS_FULL or EVENTS_FULL where the caller must grow a buffer,
@@ -391,8 +374,7 @@ def advance(
         that is needed to go on is in the arguments.
     """
     s = state[0]
-    K = Kernels(dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch)
-    m, w, b = open_model(model), open_work(work), open_buffers(buffers)
+    K, m, w, b = open_kernels(functions), open_model(model), open_work(work), open_buffers(buffers)
     if not s.started or s.unsettled:
         code = _begin(K, s, m, w, b)
         if code != 0:

@@ -16,9 +16,9 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, models, register_model
-from numba.np.arrayobj import populate_array
 
 TABLE = types.int64[:, ::1]  # one line a field: address, rows, columns
+ADDRESSES = types.int64[::1]  # of functions
 
 
 class BundleType(types.Type):
@@ -55,12 +55,43 @@ def _read_field(context: Any, builder: Any, bundle: BundleType, value: Any, name
     word = ir.IntType(64)
     table = builder.bitcast(value, word.as_pointer())
     address, *shape = (builder.load(builder.gep(table, [ir.Constant(word, 3 * row + i)])) for i in range(1 + kind.ndim))
-    itemsize = ir.Constant(word, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
+    dtype = context.get_data_type(kind.dtype)
+    itemsize = ir.Constant(word, context.get_abi_sizeof(dtype))
     strides = [itemsize] if kind.ndim == 1 else [builder.mul(itemsize, shape[1]), itemsize]
-    view = context.make_array(kind)(context, builder)
-    data = builder.inttoptr(address, context.get_data_type(kind.dtype).as_pointer())
-    populate_array(view, data=data, shape=shape, strides=strides, itemsize=itemsize, meminfo=None)
-    return view._getvalue()
+    # No proxy in memory, as numba makes one: there are more than a thousand of these to compile.
+    model = context.data_model_manager[kind]
+    parts = {
+        "data": builder.inttoptr(address, dtype.as_pointer()), "itemsize": itemsize,
+        "nitems": shape[0] if kind.ndim == 1 else builder.mul(*shape, flags=["nsw"]),
+        "shape": cgutils.pack_array(builder, shape), "strides": cgutils.pack_array(builder, strides),
+    }  # fmt: skip
+    view = ir.Constant(model.get_value_type(), None)  # which neither belongs to an object nor counts references
+    for name, part in parts.items():
+        view = builder.insert_value(view, part, model.get_field_position(name))
+    return view
+
+
+class FunctionsType(BundleType):
+    """Type of a bundle of functions: its table has one address a field. By value they would be thirty arguments."""
+
+
+register_model(FunctionsType)(_BundleModel)
+
+
+@lower_getattr_generic(FunctionsType)
+def _read_function(context: Any, builder: Any, functions: FunctionsType, value: Any, name: str) -> Any:
+    """Make the function from its address."""
+    row = functions.index[name]
+    word = ir.IntType(64)
+    address = builder.load(builder.gep(builder.bitcast(value, word.as_pointer()), [ir.Constant(word, row)]))
+    return function_at(context, builder, functions.fields[row][1], address)
+
+
+def function_at(context: Any, builder: Any, kind: types.FunctionType, address: Any) -> Any:
+    """Return what compiled code calls as from C, where it is lowered."""
+    made = cgutils.create_struct_proxy(kind)(context, builder)
+    made.c_addr = builder.inttoptr(address, cgutils.voidptr_t)
+    return made._getvalue()
 
 
 def opener(kind: BundleType) -> Any:
@@ -69,10 +100,10 @@ def opener(kind: BundleType) -> Any:
     @intrinsic
     def bundle(typingctx: Any, table: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            array = cgutils.create_struct_proxy(TABLE)(context, builder, args[0])
+            array = cgutils.create_struct_proxy(signature.args[0])(context, builder, args[0])
             return builder.bitcast(array.data, cgutils.voidptr_t)
 
-        return kind(TABLE), generate
+        return kind(ADDRESSES if isinstance(kind, FunctionsType) else TABLE), generate
 
     return bundle
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reference.core.bundles import bundle_type, opener
+from crossbody.reference import kernels
+from crossbody.reference.core.bundles import FunctionsType, bundle_type, opener
 from crossbody.reference.core.dop853_table import DENSE_STAGES, DENSE_TERMS
 from crossbody.reference.kinds import Bytes, Bytes2, Floats, Floats2, Index, Index2
 
@@ -377,7 +378,8 @@ class Work:
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)
-open_model, open_buffers, open_work = opener(MODEL), opener(BUFFERS), opener(WORK)
+KERNELS = FunctionsType("Kernels", tuple((name, kernels.function_type(name)) for name in kernels.NAMES))
+open_model, open_buffers, open_work, open_kernels = opener(MODEL), opener(BUFFERS), opener(WORK), opener(KERNELS)
 
 
 def workspace(

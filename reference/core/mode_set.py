@@ -91,7 +91,8 @@ def evaluate_set(s: Any, m: Model, w: Work) -> None:
     if pulled:
         solve(s, m, w, w.full, w.load)
         _exceed(s, w, w.full, w.load)
-        w.kept_excess[: s.na] = w.excess[: s.na]
+        for j in range(s.na):
+            w.kept_excess[j] = w.excess[j]
     solve(s, m, w, w.bare, w.la)
     _exceed(s, w, w.bare, w.la)
     for j in range(s.na):

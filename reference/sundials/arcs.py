@@ -18,8 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sksundae.cvode import CVODE
-from sksundae.ida import IDA
 
 from crossbody.cases import Outcome
 from crossbody.reference.kinds import Floats
@@ -31,6 +29,7 @@ from crossbody.reference.sundials.discrete import Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.evaluator import ENDS, Evaluator
 from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachine, View, Watch
+from crossbody.reference.sundials.solvers import CVODE, IDA
 
 SHARE = 0.1  # of the tolerance asked for: a multistep method's error grows well beyond that of one step
 CHUNK = 500  # internal steps between two looks at the clock

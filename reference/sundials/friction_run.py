@@ -5,19 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from sksundae.cvode import CVODE
 
 from crossbody.cases import Outcome
 from crossbody.reference.kinds import Floats, Floats2
 from crossbody.reference.sundials import roots
 from crossbody.reference.sundials.arcs import CHUNK, FAR, ORDER, ORDER_IN_CONTACT, SHARE, Fired, State
+from crossbody.reference.sundials.brent import brent
 from crossbody.reference.sundials.dense import DenseStep
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.friction_alarms import Alarm, values
 from crossbody.reference.sundials.friction_machine import FrictionMachine
 from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachine, View
 from crossbody.reference.sundials.run import CAUTION, SundialsRun
+from crossbody.reference.sundials.solvers import CVODE
 
 APART, APART_PART = 1e-7, 0.1  # of positions, and part of a slip without a direction: steps of differences
 RESOLVED = 64.0 * float(np.finfo(np.float64).eps)  # part of a velocity by which such a step differs from none
@@ -151,7 +151,7 @@ class SlidingArc(DenseStep):
         def ahead(t: float) -> float:
             return float(terms(t)[alarm.terms][0]) - over
 
-        return float(brentq(ahead, self.t0, t, xtol=1e-300, rtol=4.0 * ULP)) if ahead(self.t0) > 0.0 else t
+        return float(brent(ahead, self.t0, t, xtol=1e-300, rtol=4.0 * ULP)) if ahead(self.t0) > 0.0 else t
 
     def at(self, t: float) -> State:
         """The state at an instant of the last step."""

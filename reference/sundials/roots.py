@@ -17,9 +17,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from crossbody.reference.kinds import Floats
+from crossbody.reference.sundials.brent import brent
 
 SCREENING, COARSE, FINE = 4, 8, 16  # degrees tried: the first only to tell that nothing fires
 HALVINGS = 6
@@ -152,7 +152,7 @@ def _inspect(terms: Terms, marks: list[float], armed: bool) -> float | None:
 def _locate(guard: Callable[[float], float], before: float, fired: float) -> float:
     """The instant at which a guard, above zero before, is so no longer."""
     resolution = 2.0 * ULP * max(abs(before), abs(fired))
-    t = float(brentq(guard, before, fired, xtol=max(resolution, 1e-300), rtol=4.0 * ULP))
+    t = float(brent(guard, before, fired, xtol=max(resolution, 1e-300), rtol=4.0 * ULP))
     while guard(t) > 0.0 and t < fired:
         t = min(t + resolution, fired)
     return t

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import qr
-from scipy.optimize import nnls
 
 from crossbody.cases import Outcome
 from crossbody.reference.kinds import Floats
@@ -45,6 +44,8 @@ class Sharing:
 
 def least_distance(G: Floats, h: Floats) -> tuple[Floats, Floats] | None:
     """Return the smallest x with G x >= h and the multipliers of its rows; None if there is no such x."""
+    from scipy.optimize import nnls  # which takes longer to import than most runs
+
     size = float(np.abs(h).max(initial=0.0)) or 1.0
     E = np.vstack([G.T, h / size])
     target = np.zeros(len(E))
@@ -190,6 +191,8 @@ def _pulling(at: _Rows, y: Floats, one_sided: Flags, carrying: list[int]) -> lis
 
 def _pushing(at: _Rows, y: Floats, one_sided: Flags, spent: Flags) -> list[int]:
     """Return places of few rows that exert the forces without any of them pulling; none if there are none."""
+    from scipy.optimize import nnls
+
     force, raw = y - at.free, at.A * at.length[:, None]
     lam, off = nnls(np.vstack([raw, -raw[~one_sided]]).T, force)
     if off > NOTHING * float(np.abs(force).max()):

@@ -14,6 +14,7 @@ from crossbody.cases import Case, CaseUnsupported, Chaos, EngineUnavailable, Out
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
+from crossbody.reference import ahead
 from crossbody.reports.judging.answers import Answers
 from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, motion, tight
 from crossbody.reports.measuring.alignment import matched
@@ -59,9 +60,11 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
     arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:
         # SUNDIALS runs the level machine alone: any other truth is known by itself only.
+        apart = case.fsm == "level" and engines.load("reference").why_not(case, "cvode") is None
+        if apart and not case.general:
+            ahead.meanwhile("SUNDIALS")
         known = followed(case) if known is None else known
         case, first = known.case, known.motion
-        apart = case.fsm == "level" and engines.load("reference").why_not(case, "cvode") is None
         found = _integrated(case, first, "cvode" if apart else "compiled", budget=budget)
         return replace(found, part=known.part, short=known.why)
     exact = case.closed_form

@@ -20,9 +20,9 @@ from crossbody.cases import (
     Trajectory,
     Value,
 )
-from crossbody.cases.files.case import rubbing
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
+from crossbody.reports.judging.covered import covered
 from crossbody.reports.judging.parts import RATIO, Study
 from crossbody.reports.judging.reach import BUDGET, estimated, followed
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
@@ -106,11 +106,11 @@ def run_case(
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} is not available. {why}")
     if truth is None and case.general and case.closed_form is None:
-        reached = followed(_with_friction(case, budget), budget)
+        reached = followed(covered(case, budget), budget)
+        _refuse_uncovered(reached.case, reached.motion)
         case, truth = reached.case, truth_of(reached.case, reached, budget)
     truth = truth_of(case) if truth is None else truth
-    if case.file and truth.trajectory.outcome is Outcome.INCONSISTENT:
-        raise CaseUnsupported(f"{case.label}: {truth.trajectory.message}")
+    _refuse_uncovered(case, truth.trajectory)
     if math.isfinite(truth.tight):
         case = replace(case, tight=truth.tight)
     known = "reference" in engines.names()
@@ -129,16 +129,10 @@ def run_case(
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
 
 
-def _with_friction(case: Case, budget: float) -> Case:
-    """Return a file's case with the friction of its contacts where its motion comes to one; else as it is.
-
-    Engines without friction run what never comes to any.
-    """
-    rubs = rubbing(case)
-    if rubs is None:
-        return case
-    run = engines.load("reference").prepare(case, "compiled", time_limit=budget).run()
-    return rubs if run.outcome is Outcome.INCONSISTENT else case
+def _refuse_uncovered(case: Case, motion: Trajectory) -> None:
+    """Refuse a file that its motion contradicts: nothing could be judged."""
+    if case.file and motion.outcome is Outcome.INCONSISTENT:
+        raise CaseUnsupported(f"{case.label}: {motion.message}")
 
 
 def ended(case: Case, pick: Pick, why: str) -> Entry:

@@ -1,43 +1,136 @@
-"""Pieces that are compiled beside the integrator."""
+"""Pieces that are compiled beside the kernels of a mechanism, and work that compiling is spared."""
 
+import gc
 import sys
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
-from numba import float64
+from numba import float64, void
+from numba.core.errors import NumbaRuntimeError
+from numba.core.types.functions import BaseFunction
 
-from crossbody.reference import ahead
-from crossbody.reference.cache import compiled
+from crossbody.reference import _program, ahead, code_store, kernels
+from crossbody.reference._hastened import hastened
+from crossbody.reference.cache import ALLOCATES_NOTHING, compiled
+from crossbody.reference.systems import absent
 
 
 def doubled(x: float) -> float:
     return x + x
 
 
-def test_others_are_begun_where_code_is_compiled_and_not_where_it_is_read_back(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def moved(x: np.ndarray) -> None:
+    x[1:] = x[:-1]
+
+
+@pytest.fixture
+def begun(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[list[str]]]:
+    """Commands of the processes that are begun, none of which is."""
+    found: list[list[str]] = []
+    monkeypatch.setattr(ahead, "_alone", False)
+    monkeypatch.setattr(ahead.atexit, "register", lambda *given: None)
+    monkeypatch.setattr(ahead.subprocess, "Popen", lambda call, **how: found.append(call))
+    ahead.begin.cache_clear()
+    yield found
+    ahead.begin.cache_clear()
+
+
+def test_the_loop_is_begun_with_the_first_code_that_is_compiled_and_not_where_it_is_read_back(
+    begun: list[list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path))
-    begun: list[int] = []
-    found = [compiled(doubled, [float64(float64)], beside=lambda: begun.append(1))(2.0) for _ in range(2)]
-    assert (found, begun) == ([4.0, 4.0], [1])
+    count = []
+    for _ in range(2):
+        ahead.begin.cache_clear()
+        assert compiled(doubled, [float64(float64)])(2.0) == 4.0  # a user's own code begins nothing
+        compiled(absent.gaps.py_func, [kernels.REAL["gaps"]])
+        count.append(len(begun))
+    assert count == [1, 1]
 
 
 @pytest.mark.parametrize("processors", [1, 2])
-def test_they_are_begun_where_a_processor_is_free(processors: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    begun: list[list[str]] = []
-    monkeypatch.setattr(ahead, "_alone", False)
+def test_it_is_begun_where_a_processor_is_free_and_said_at_once(
+    processors: int, begun: list[list[str]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.setattr(code_store, "_told", set())
+    monkeypatch.setattr(_program, "is_missing", lambda: True)
     monkeypatch.setattr(ahead.os, "cpu_count", lambda: processors)
-    monkeypatch.setattr(ahead.atexit, "register", lambda *given: None)
-    monkeypatch.setattr(ahead.subprocess, "Popen", lambda call, **how: begun.append(call))
+    ahead.begin()
     ahead.begin()
     assert [call[0] for call in begun] == [sys.executable] * (processors - 1)
-    assert set(ahead.BESIDE) <= set(ahead.PIECES)
     assert all(repr(name) in call[2] for call in begun for name in ahead.BESIDE)
+    assert set(ahead.BESIDE) <= set(ahead.PIECES)
+    assert capsys.readouterr().err == f"crossbody: {code_store.COMPILING}\n"
 
 
-def test_who_compiles_piece_by_piece_begins_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ahead, "_alone", False)
-    monkeypatch.setattr(ahead.subprocess, "Popen", lambda call, **how: pytest.fail("begun"))
+def test_nothing_is_begun_where_the_loop_is_kept(begun: list[list[str]]) -> None:
+    _program.program()
+    begun.clear()
+    ahead.begin.cache_clear()
+    ahead.begin()
+    assert begun == []
+
+
+def test_who_compiles_piece_by_piece_begins_no_other(begun: list[list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_program, "is_missing", lambda: True)
     ahead.compile_piece("modes")
     ahead.begin()
+    assert begun == []
+
+
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_piece_is_compiled_here_only_while_another_process_compiles_the_loop(
+    missing: bool, begun: list[list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pieces: list[str] = []
+    monkeypatch.setattr(_program, "is_missing", lambda: missing)
+    monkeypatch.setattr(ahead, "compile_piece", pieces.append)
+    ahead.meanwhile("SUNDIALS")
+    assert pieces == []  # where nothing was compiled nothing is missing
+    ahead.begin()
+    ahead.meanwhile("SUNDIALS")
+    assert pieces == ["SUNDIALS"] * missing
+
+
+def test_a_sum_of_numbers_is_resolved_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path))
+    asked: list[tuple[object, ...]] = []
+    resolve = BaseFunction.get_call_type
+
+    def noted(function: BaseFunction, context: object, args: tuple[object, ...], kws: object) -> object:
+        asked.append((function.typing_key, *args))
+        return resolve(function, context, args, kws)
+
+    monkeypatch.setattr("crossbody.reference._hastened._resolve", noted)
+    monkeypatch.setattr(BaseFunction, "get_call_type", noted)
+
+    def total(x: float, y: float) -> float:
+        a = x + y
+        b = a + y
+        c = b + a
+        return c + b
+
+    found = compiled(total, [float64(float64, float64)])
+    assert len(asked) == len(set(asked)) == 1
+    assert found(1.0, 2.0) == total(1.0, 2.0)
+
+
+def test_the_collector_and_numba_are_as_they_were() -> None:
+    before = BaseFunction.get_call_type
+    with hastened():
+        with suppress(ZeroDivisionError), hastened():
+            raise ZeroDivisionError
+        assert not gc.isenabled()
+        assert BaseFunction.get_call_type is not before
+    assert gc.isenabled()
+    assert BaseFunction.get_call_type is before
+
+
+def test_the_core_is_refused_what_allocates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is moved within an array is copied first, by numba: memory, and twenty functions on strings to compile."""
+    monkeypatch.setattr(moved, "__module__", ALLOCATES_NOTHING[0] + "advance")
+    with pytest.raises(NumbaRuntimeError, match="NRT required"):
+        compiled(moved, [void(float64[::1])])

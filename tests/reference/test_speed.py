@@ -11,11 +11,11 @@ from numba import types
 from sksundae.cvode import CVODE
 
 from crossbody import cases, engines
-from crossbody.reference import Options, kernels, prepare
+from crossbody.reference import Options, prepare
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import OWN, accelerate, activate
-from crossbody.reference.core.advance import Kernels
-from crossbody.reference.core.layout import CONTACT, STATE, open_buffers, open_model, open_work
+from crossbody.reference.core.bundles import ADDRESSES
+from crossbody.reference.core.layout import CONTACT, STATE, open_buffers, open_kernels, open_model, open_work
 from crossbody.reference.sundials.quiet import quiet
 
 pytestmark = pytest.mark.bench
@@ -140,12 +140,11 @@ def test_how_far_the_loop_is_from_its_right_hand_sides():
     run = prepare(ball(), [1.0], [0.0], Options(t_end=T_END, rtol=1e-9, shortcuts=False, samples=[T_END]))
     run.go()
     count = int(run.state["rhs"][0])
-    functions = [kernels.function_type(name) for name in kernels.NAMES]
     table = types.int64[:, ::1]
     evaluate = compiled(
-        _evaluations, [types.void(*functions, numba.typeof(np.zeros(1, STATE)), table, table, table, types.int64)]
+        _evaluations, [types.void(ADDRESSES, numba.typeof(np.zeros(1, STATE)), table, table, table, types.int64)]
     )
-    arguments = (*ball().kernels.values(), run.state, *run.tables)
+    arguments = (run.call.args[0], run.state, *run.tables)
     many = 1000
     loop, alone, alone_many = _seconds(
         run.go, lambda: evaluate(*arguments, 0), lambda: evaluate(*arguments, many * count)
@@ -156,12 +155,9 @@ def test_how_far_the_loop_is_from_its_right_hand_sides():
     assert loop / bound < 10.0
 
 
-def _evaluations(
-    dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch, state, model, work, buffers, count
-):  # fmt: skip
+def _evaluations(functions, state, model, work, buffers, count):
     s = state[0]
-    K = Kernels(dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch)
-    m, w, b = open_model(model), open_work(work), open_buffers(buffers)
+    K, m, w, b = open_kernels(functions), open_model(model), open_work(work), open_buffers(buffers)
     b.mode[0] = CONTACT
     activate(s, m, w, b.mode)
     for _ in range(count):

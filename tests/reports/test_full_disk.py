@@ -68,13 +68,13 @@ def test_compiled_code_that_finds_no_room_is_told_and_not_believed(
         if kept is not None:
             store.write("name", kept)
         for limit in (0, 1, 9000, *(draw.randrange(9000) for _ in range(12))):
-            code_store.tell.cache_clear()
+            code_store._told.clear()
             with no_file_above(limit):
                 store.write("name", data)
             assert "it serves this process alone" in capsys.readouterr().err
             assert store.read("name") == kept
             assert names(tmp_path) == ([] if kept is None else [f"name{CODE}"])
-    code_store.tell.cache_clear()
+    code_store._told.clear()
 
 
 KERNEL = """

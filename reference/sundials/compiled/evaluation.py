@@ -19,10 +19,10 @@ import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
-from crossbody.reference._program import ADDRESSES, address, at_address, bound
+from crossbody.reference._program import address, at_address, bound
 from crossbody.reference._system import System
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.bundles import TABLE, bundle_type, opener, table
+from crossbody.reference.core.bundles import ADDRESSES, TABLE, bundle_type, opener, table
 from crossbody.reference.kinds import Array, Floats, Floats2, Index
 
 # What is asked of `evaluate`.
@@ -271,8 +271,9 @@ def _share(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Float
         for c in range(n):
             C[c, d] = -s.H[d, c]
     _assemble(dynamics, rows, s, t, q, v, s.idx, na)
-    A[:n, n + na : n + na + beside] = C[:n, :beside]
-    A[n : n + na, n + na : n + na + beside] = 0.0
+    for d in range(beside):
+        for c in range(n + na):
+            A[c, n + na + d] = C[c, d] if c < n else 0.0
     if _eliminate(A, C, n + na, beside) != 0:
         return ILL_POSED
     for d in range(beside):
@@ -484,6 +485,13 @@ def _spent(dynamics: Any, rows: Any, s: Workspace, t: float, q: Floats, v: Float
 
 
 @compiled
+def _copy(x: Floats, y: Floats) -> None:
+    """Copy entry by entry: to say why arrays do not fit numba compiles all that strings need."""
+    for i in range(len(y)):
+        y[i] = x[i]
+
+
+@compiled
 def _terms(
     dynamics: Any, gaps: Any, rows: Any, watch: Any, s: Workspace, t: float, q: Floats, v: Floats, out: Any
 ) -> int:
@@ -495,7 +503,8 @@ def _terms(
     for e in range(s.size[5]):
         kind = s.kind[e]
         if kind == FORCE and not known:
-            s.law_q[:], s.law_v[:] = q, v
+            _copy(q, s.law_q)
+            _copy(v, s.law_v)
             # Positions that turn stay where they are: the law's own gaps are most of what counts.
             if not s.size[8] and _put_on_law(dynamics, rows, s, t, s.law_q, s.law_v) != GOOD:
                 return NOT_FINITE
@@ -613,7 +622,7 @@ def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
     code = _accelerate(dynamics, rows, s, t, s.q, s.v, False)
     for i in range(n):
         s.a1[i] = s.solution[i, 0]
-    s.lam1[:] = s.lam
+    _copy(s.lam, s.lam1)
     return int(code)
 
 
@@ -621,7 +630,8 @@ def _carry(dynamics: Any, rows: Any, s: Workspace, t: float, y: Any) -> int:
 def _move_on(s: Workspace, t: float, y: Any) -> None:
     """The last step ends at t; what was its end is its start."""
     s.clock[3], s.clock[2] = s.clock[2], t
-    s.y0[:], s.a0[:] = s.y1, s.a1
+    _copy(s.y1, s.y0)
+    _copy(s.a1, s.a0)
     for i in range(len(y)):
         s.ends[0, i], s.ends[1, i] = s.ends[1, i], y[i]
 

@@ -1,0 +1,48 @@
+"""Whether a file's model covers its motion, found at its start and by cheap runs, before anything that takes long."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases.files.case import rubbing
+from crossbody.cases.files.contacts import Meeting, meeting
+from crossbody.reports.judging.reach import COARSE, motion
+
+LOOSE = 100.0
+"""Tolerance of a second run, in units of that of the first, which tells whether their motion is known so far."""
+SAME = 1e-3
+"""Part of the time at which shapes meet by which two runs may be apart that know when."""
+
+
+def covered(case: Case, budget: float) -> Case:
+    """Return a file's case, with the friction of its contacts where its motion comes to one; other cases as they are.
+
+    Engines without friction run what never comes to any.
+
+    Args:
+        case: the scene.
+        budget: time that a run may take, s.
+
+    Raises:
+        CaseUnsupported: if shapes of the file surely meet whose contacts no row stands for: nothing could be judged.
+    """
+    if not case.file:
+        return case
+    met = _met(case, COARSE, budget)
+    if met is not None and (rubs := rubbing(case)) is not None:
+        case, met = rubs, _met(rubs, COARSE, budget)
+    if met is None:
+        return case
+    again = _met(case, LOOSE * COARSE, budget) if met.t > 0.0 else met
+    if again is not None and abs(again.t - met.t) <= SAME * met.t:
+        raise CaseUnsupported(f"{case.label}: {met.told}")
+    return case
+
+
+def _met(case: Case, rtol: float, budget: float) -> Meeting | None:
+    """Return where shapes meet that have no row: at the start, or else on the motion at a tolerance."""
+    if (first := meeting(case, np.zeros(1), case.q0[None], case.v0[None])) is not None:
+        return first
+    run = motion(case, rtol, time_limit=budget)
+    return meeting(case, run.t, run.q, run.v)

@@ -1,0 +1,73 @@
+"""A file whose motion leaves its model is refused before anything that takes long is run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crossbody import cases, engines
+from crossbody.cases import Case, CaseUnsupported
+from crossbody.reports.judging.covered import covered
+from crossbody.reports.judging.reach import BUDGET, COARSE
+from crossbody.reports.runs.choice import picks
+from crossbody.reports.runs.jobs import run_case
+
+SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="2 2 .1"/>
+<body name="a" pos="0 0 .05"><freejoint/><geom name="a" type="box" size=".05 .05 .05" mass="1"/></body>
+<body name="b" pos="{place}" euler="{turn}"><freejoint/>
+<geom name="b" type="{kind}" size=".04 .04 .05" mass=".5"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Tolerances of the runs that the reference is asked for; infinity for those of another solver."""
+    reference, found = type(engines.load("reference")), []
+    prepare = reference.prepare
+
+    def noted(self: Any, case: Case, profile: str = "compiled", **settings: Any) -> Any:
+        found.append(settings.get("rtol", COARSE) if profile == "compiled" else 0.0)
+        return prepare(self, case, profile, **settings)
+
+    monkeypatch.setattr(reference, "prepare", noted)
+    return found
+
+
+def scene(folder: Path, place: str, turn: str = "0 0 0", kind: str = "box") -> Case:
+    path = folder / "scene.xml"
+    path.write_text(SCENE.format(place=place, turn=turn, kind=kind))
+    return cases.from_file(path)
+
+
+def test_what_the_start_tells_is_told_before_any_run(tmp_path: Path, asked: list[float]) -> None:
+    with pytest.raises(CaseUnsupported, match="Shapes 'a' and 'b' come within reach at t = 0 s"):
+        run_case(scene(tmp_path, ".01 0 .15"), picks(("reference:compiled",)))
+    assert asked == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whatever_falls_onto_what_has_no_row_is_refused_by_cheap_runs(
+    seed: int, tmp_path: Path, asked: list[float]
+) -> None:
+    rng = np.random.default_rng(seed)
+    x, y, z = *rng.uniform(-0.03, 0.03, 2), rng.uniform(0.25, 0.6)
+    turn = " ".join(f"{angle:.3g}" for angle in rng.uniform(-40.0, 40.0, 3))
+    dropped = scene(tmp_path, f"{x:.3g} {y:.3g} {z:.3g}", turn, str(rng.choice(["box", "cylinder"])))
+    with pytest.raises(CaseUnsupported, match=r"Shapes '[ab]' and '[ab]' come within reach") as told:
+        run_case(dropped, picks(("reference:compiled",)))
+    assert 1 <= len(asked) <= 3  # without friction, with it, and to know that it is sure
+    assert min(asked) >= COARSE
+    met = float(str(told.value).split(" at t = ")[1].split(" s")[0])
+    reach = np.linalg.norm([0.04, 0.04, 0.05])  # of a body that turns, from its centre
+    assert np.sqrt(2.0 * max(z - 0.1 - reach, 0.0) / 9.81) <= met <= np.sqrt(2.0 * (z - 0.1) / 9.81)
+
+
+def test_what_stays_within_its_model_is_as_it_was(tmp_path: Path, asked: list[float]) -> None:
+    apart = scene(tmp_path, "1 0 5")
+    assert covered(apart, BUDGET).parameters["t_end"] == apart.parameters["t_end"]
+    assert len(asked) <= 2
+    own = cases.load("bouncing_ball")
+    assert covered(own, BUDGET) is own
