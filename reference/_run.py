@@ -266,7 +266,7 @@ class CompiledRun:
             counts=MappingProxyType(
                 {name: int(state[name]) for name in _COUNTERS}
                 | {"events": int(state["events"] + state["dropped"])}
-                | {name: int(state[name]) for name in ("redundant", *_NOTES) if state[name]}
+                | {name: int(state[name]) for name in ("redundant", "not_searched", *_NOTES) if state[name]}
             ),
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
             if self.nz

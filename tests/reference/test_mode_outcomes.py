@@ -1,0 +1,55 @@
+"""What a mode problem ends with: motion, motions, or a jam, as the enumeration of all sets of modes has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import linear
+from mode_enumeration import Contact, enumerated
+
+from crossbody.cases import Outcome
+from crossbody.reference import simulate
+
+CLEAR = 1e-3  # m/s^2, or of a determinant: below it the law is all but undecided
+CLOSING, DAMPING = 1e-3, 200.0  # m/s and 1/s, of contacts that touch
+
+
+def drawn(rng: np.random.Generator, ways: int) -> tuple[Any, Any, Any, float, list[Contact]]:
+    """Return rows, forces, velocities and mu of contacts that slide and stand, some pressed by friction of the next."""
+    k, mu = int(rng.integers(1, 4)), float(rng.uniform(0.3, 3.0))
+    rows = k * (1 + ways)
+    n = rows + int(rng.integers(0, 3))
+    H = rng.normal(size=(rows, n)) * 0.6 + np.eye(rows, n)
+    force = rng.normal(size=n) * 2.0 - H[:k].T @ np.abs(rng.normal(size=k)) * 2.0
+    slip = rng.normal(size=(k, ways))
+    slip *= (rng.random(k) < 0.6)[:, None] / np.linalg.norm(slip, axis=1)[:, None]
+    for i in np.flatnonzero(slip.any(axis=1)):
+        H[k + ways * i : k + ways * (i + 1)] -= slip[i][:, None] * rng.uniform(0.0, 2.0) / mu * H[(i + 1) % k]
+    v0 = np.linalg.lstsq(H, np.concatenate([np.full(k, -CLOSING), slip.ravel()]), rcond=None)[0]
+    places = [k + ways * i + np.arange(ways) for i in range(k)]
+    contacts = [Contact(i, places[i].tolist(), mu, slip[i] if slip[i].any() else None) for i in range(k)]
+    return H, force, v0, mu, contacts
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+@pytest.mark.parametrize("seed", [*range(6), *(pytest.param(k, marks=pytest.mark.slow) for k in range(6, 40))])
+def test_a_mode_problem_ends_as_all_its_sets_have_it(seed: int, ways: int) -> None:
+    """One motion, several, or none because contacts jam: never that no set was found where there is one."""
+    rng, ends = np.random.default_rng(seed), set[Outcome]()
+    for _ in range(10):
+        H, force, v0, mu, contacts = drawn(rng, ways)
+        bare = -H @ force
+        bare[: len(contacts)] += CLOSING * DAMPING
+        tried = enumerated(H @ H.T, bare, contacts)
+        if min(min(abs(one.margin), abs(one.jam)) for one in tried) < CLEAR:
+            continue
+        motions = {tuple(np.round(one.excess, 6)) for one in tried if one.margin > 0.0 and one.jam > 0.0}
+        made = linear(H, force, mu, len(contacts), a1=DAMPING)
+        run = simulate(made, np.zeros(len(force)), v0, 1e-9, rtol=1e-6, max_steps=3)
+        assert run.outcome is (Outcome.FINISHED if motions else Outcome.PAINLEVE), run.message
+        assert ("not_unique" in run.counts) == (len(motions) > 1)
+        assert (run.unique_until == 0.0) == (len(motions) > 1)
+        ends.add(run.outcome)
+    assert ends
