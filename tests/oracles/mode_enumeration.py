@@ -37,12 +37,14 @@ class Tried:
         excess: by how much faster than its law every row moves.
         margin: by how much the least of its conditions is kept, m/s^2; less than 0 if one is not.
         jam: determinant of what the forces do to their rows, of size 1; none go on where it is not positive.
+        pressing: how many real eigenvalues of that are negative. Of an even number the determinant tells nothing.
     """
 
     modes: tuple[str, ...]
     excess: np.ndarray
     margin: float
     jam: float
+    pressing: int
 
 
 def enumerated(G: np.ndarray, bare: np.ndarray, contacts: list[Contact]) -> list[Tried]:
@@ -57,8 +59,8 @@ def enumerated(G: np.ndarray, bare: np.ndarray, contacts: list[Contact]) -> list
 
 def _solved(
     G: np.ndarray, bare: np.ndarray, contacts: list[Contact], modes: tuple[str, ...], ways: dict[int, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Multipliers and excess of all rows, and the determinant."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Multipliers and excess of all rows, and the eigenvalues of what the forces do to their rows."""
     columns, rows, unit = [], list[int](), np.eye(len(G))
     for i, (one, mode) in enumerate(zip(contacts, modes, strict=True)):
         if mode == OFF:
@@ -72,14 +74,14 @@ def _solved(
             columns += [unit[k] for k in one.along]
             rows += one.along
     if not rows:
-        return np.zeros(len(G)), -bare, 1.0
+        return np.zeros(len(G)), -bare, np.ones(1)
     W = np.array(columns).T
     A, size = (G @ W)[rows], np.sqrt(np.diag(G)[rows])
     values, vectors = np.linalg.eigh(G[np.ix_(rows, rows)] / np.outer(size, size))
     base = vectors[:, values > 1e-10 * values[-1]]
-    jam = float(np.linalg.det(base.T @ (A / np.outer(size, size)) @ base))
+    jams = np.linalg.eigvals(base.T @ (A / np.outer(size, size)) @ base)
     lam = W @ np.linalg.lstsq(A, bare[rows], rcond=1e-10)[0]
-    return lam, G @ lam - bare, jam
+    return lam, G @ lam - bare, jams
 
 
 def _across(excess: np.ndarray, one: Contact, angle: float) -> float:
@@ -134,7 +136,7 @@ def _directions(
 def _tried(
     G: np.ndarray, bare: np.ndarray, contacts: list[Contact], modes: tuple[str, ...], ways: dict[int, np.ndarray]
 ) -> Tried:
-    lam, excess, jam = _solved(G, bare, contacts, modes, ways)
+    lam, excess, jams = _solved(G, bare, contacts, modes, ways)
     kept = [np.inf]
     for i, (one, mode) in enumerate(zip(contacts, modes, strict=True)):
         heavy = G[one.normal, one.normal]
@@ -148,4 +150,5 @@ def _tried(
         elif one.slip is None:
             kept.append(float(ways[i] @ excess[one.along]))
     exact = [x for x in kept if not 0.0 <= x <= SAME * float(np.abs(bare).max())]  # laws that are kept are no margin
-    return Tried(modes, excess, min(exact), jam)
+    pressing = int((jams.real[np.abs(jams.imag) <= SAME * np.abs(jams)] < 0.0).sum())
+    return Tried(modes, excess, min(exact), float(np.prod(jams).real), pressing)
