@@ -147,6 +147,7 @@ STATE = np.dtype(
         ("growth", "f8"),  # and what part of it the largest one is
         ("sets", "i8"),  # of modes that were tried
         ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters,
+        ("loops_press", "i8"),  # because loops hold one of them,
         ("determined_until", "f8"),  # s: from then on
         ("open_t", "f8"),  # up to when that was followed,
         ("open_way", "f8"),  # by how much it may have moved anything,

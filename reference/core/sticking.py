@@ -136,7 +136,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     for i in range(s.nc):
         w.off[i], w.begins[i] = 0, 0
     if s.loops and not s.indeterminate and _leaves_open(s, m, w):
-        s.indeterminate, s.determined_until = 1, s.t
+        s.indeterminate, s.loops_press, s.determined_until = 1, 1, s.t
     return 0
 
 
