@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import linear
+from friction_scenes import box_on_floor, linear, run, sphere_on_floor
 from mode_enumeration import Contact, enumerated
 
-from crossbody.cases import Outcome
+from crossbody import cases
+from crossbody.cases import Outcome, Tier
 from crossbody.reference import simulate
+from crossbody.reports.judging.comparison import truth_row
+from crossbody.reports.measuring.truth import from_run
 
 CLEAR = 1e-3  # m/s^2, or of a determinant: below it the law is all but undecided
 CLOSING, DAMPING = 1e-3, 200.0  # m/s and 1/s, of contacts that touch
@@ -48,12 +52,24 @@ def test_a_mode_problem_ends_as_all_its_sets_have_it(seed: int, ways: int, solve
             continue
         if any(one.margin > 0.0 and one.jam > 0.0 and one.pressing for one in tried):  # an even number of them: no jam
             continue  # that forces come to gradually, which is all that a determinant tells
-        found = {one.modes: one.excess for one in tried if one.margin > 0.0 and one.jam > 0.0}
-        motions = {tuple(np.round(excess, 6)) for excess in found.values()}  # of one set one direction is looked for
+        sets = {one.modes: one.excess for one in tried if one.margin > 0.0 and one.jam > 0.0}
+        motions = {tuple(np.round(excess, 6)) for excess in sets.values()}  # of one set one direction is looked for
         made = linear(H, force, mu, len(contacts), a1=DAMPING)
-        run = simulate(made, np.zeros(len(force)), v0, 1e-9, rtol=1e-6, max_steps=400, solver=solver)
-        assert run.outcome is (Outcome.FINISHED if motions else Outcome.PAINLEVE), run.message
-        assert ("not_unique" in run.counts) == (len(motions) > 1)
-        assert (run.unique_until == 0.0) == (len(motions) > 1)
-        ends.add(run.outcome)
+        found = simulate(made, np.zeros(len(force)), v0, 1e-9, rtol=1e-6, max_steps=400, solver=solver)
+        assert found.outcome is (Outcome.FINISHED if motions else Outcome.PAINLEVE), found.message
+        assert ("not_unique" in found.counts) == (len(motions) > 1)
+        assert (found.unique_until == 0.0) == (len(motions) > 1)
+        ends.add(found.outcome)
     assert ends
+
+
+def test_where_a_second_motion_is_not_looked_for_is_told() -> None:
+    """Of four corners that stand there are too many sets; one contact of a sphere leaves no doubt."""
+    start = np.zeros(6), 0.1
+    box = run(box_on_floor(0.5), [0, 0, 0.1, 1, 0, 0, 0], *start)
+    case = cases.from_scene(box_on_floor(0.5), q0=[0, 0, 0.1, 1, 0, 0, 0], t_end=0.1)
+    (row,) = truth_row(case, replace(from_run(box, Tier.D, "itself"), allowed=1e-6), "")
+    assert box.counts["not_searched"] == 1
+    assert "too many contacts could change to look for a second motion" in row.why
+    sphere = run(sphere_on_floor(0.5, 0.1), [0, 0, 0.1, 1, 0, 0, 0], *start)
+    assert "not_searched" not in sphere.counts
