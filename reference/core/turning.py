@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.coulomb import factor_set, respond
+from crossbody.reference.core.coulomb import factor_as_held, respond
 from crossbody.reference.core.directions import lengthened
 from crossbody.reference.core.friction import has_begun, has_friction
 from crossbody.reference.core.layout import Model, Work
@@ -68,7 +68,7 @@ def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
             w.turning[count] = i
             count += 1
     if count > 0 and s.dependent_rows > 0:
-        factor_set(s, m, w)  # its place is used by others
+        factor_as_held(s, m, w)  # its place is used by others
     for b in range(count):
         part = turn_part(s, m, w, w.turning[b])
         for a in range(count):
