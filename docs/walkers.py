@@ -15,9 +15,11 @@ import numpy as np
 from speed import markdown, replaced
 
 from crossbody import cases
-from crossbody.cases import Tier
-from crossbody.reports.judging.comparison import judged
+from crossbody.cases import Case, Tier
+from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.parts import Positions, splits
 from crossbody.reports.judging.verdict import Row
+from crossbody.reports.measuring.truth import Truth, shortened
 from crossbody.reports.runs.choice import picks
 from crossbody.reports.runs.jobs import run_case
 
@@ -31,7 +33,7 @@ T_END, BUDGET = 1.0, 60.0
 def main() -> None:
     """Measure, and put the table in its place."""
     rows = [row_of(name) for name in sys.argv[1:] or HELD]
-    head = ("Robot", "Compared", "Known by", "Reference", "MuJoCo as it stands")
+    head = ("Robot", "Compared", "Known by", "Reference", "MuJoCo as it stands", "of its model", "of its step")
     table = markdown(head, rows)
     print(table)
     if not sys.argv[1:]:
@@ -48,12 +50,26 @@ def row_of(name: str) -> tuple[object, ...]:
         case = cases.load(str(path), ctrl=str(controls(path, HELD[name], Path(work))), t_end=T_END)
         result = run_case(case, picks(("reference:compiled", "mujoco:as_is")), budget=BUDGET)
     rows = [row.row() for row in judged(result.case, result.entries, result.truth, "")]
+    trusted = shortened(result.truth)
     (truth,) = (row for row in rows if row["engine"] == "truth")
     until = float(truth["compared"]) * T_END
     return (
         f"`{name}.xml`", f"{until:.3g} s", "two witnesses (C)" if truth["tier"] == Tier.C else "itself (D)",
         size(rows, "reference", "position"), size(rows, "mujoco", "position"),
+        *parts(result.case, trusted, result.entries[-1]),
     )  # fmt: skip
+
+
+def parts(case: Case, truth: Truth, entry: Entry) -> tuple[str, str]:
+    """How much of MuJoCo's worst error is its model's and how much its step's, and what both are known to."""
+    assert entry.run is not None
+    assert entry.study is not None
+    split = splits(case, truth, entry.run, entry.study)["position"]
+    if "model" in split.there:
+        known = split.known["model"]
+        return f"{split.there['model']:.1e} ± {known:.0e}", f"{split.there['step']:.1e} ± {known:.0e}"
+    laid, (coarse, fine) = Positions(case, truth, entry.run), entry.study.runs[-2:]
+    return (f"not settled ({np.abs(laid(coarse) - laid(fine)).max():.1e})",) * 2
 
 
 def controls(path: Path, held: float, work: Path) -> Path:

@@ -52,6 +52,10 @@ _NOTES = {
     "not_unique": "modes_not_unique: more than one set of sticking and sliding contacts was consistent at an instant; "
     "the one that was reached first was taken.",
 }
+_LOOPS_PRESS = (
+    "indeterminate: loops hold a contact that may slide, so that no law says how hard it presses, nor its friction; it "
+    "was taken without any."
+)
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
 
@@ -268,7 +272,7 @@ class CompiledRun:
             counts=MappingProxyType(
                 {name: int(state[name]) for name in _COUNTERS}
                 | {"events": int(state["events"] + state["dropped"])}
-                | {name: int(state[name]) for name in ("redundant", *_NOTES) if state[name]}
+                | {name: int(state[name]) for name in ("redundant", "not_searched", *_NOTES) if state[name]}
             ),
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
             if self.nz
@@ -306,7 +310,8 @@ class CompiledRun:
 
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
-            return " ".join(text for name, text in _NOTES.items() if self.state[name][0])
+            told = _NOTES | ({"indeterminate": _LOOPS_PRESS} if self.state["loops_press"][0] else {})
+            return " ".join(text for name, text in told.items() if self.state[name][0])
         q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
         return f"{outcome.advice} {self._cause(outcome, q, v)}{where}."

@@ -42,7 +42,7 @@ def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
     if s.loops and eliminate(s, m, w) != 0:
         return 1
     take_directions(s, m, w, turning)
-    _factor_as_held(s, m, w)
+    factor_as_held(s, m, w)
     return int(s.rank == 0 and s.unknowns > 0)
 
 
@@ -58,7 +58,7 @@ def factor_set(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def _factor_as_held(s: Any, m: Model, w: Work) -> None:
+def factor_as_held(s: Any, m: Model, w: Work) -> None:
     """Factor A; sticking rows that depended on others when modes were decided do so until they are decided anew.
 
     Near there rounding says whether they do, and what they bear is nothing like what they bear where they do not.

@@ -148,6 +148,7 @@ STATE = np.dtype(
         ("growth", "f8"),  # and what part of it the largest one is
         ("sets", "i8"),  # of modes that were tried
         ("indeterminate", "i8"),  # the law did not say how some contacts that slide share their load, and it matters,
+        ("loops_press", "i8"),  # because loops hold one of them,
         ("determined_until", "f8"),  # s: from then on
         ("open_t", "f8"),  # up to when that was followed,
         ("open_way", "f8"),  # by how much it may have moved anything,
@@ -157,8 +158,10 @@ STATE = np.dtype(
         ("open_lever", "f8"),  # and what of a slip that is beside the coordinates' velocities
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent,
         ("unique_until", "f8"),  # s: and the first of them
+        ("not_searched", "i8"),  # instants at which there were too many sets to see whether another was
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("jam", "i8"),  # contacts have just come to where they jam together
+        ("pressed_in", "i8"),  # a contact that jams in a set that was tried, -1 if none does
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding
         (
             "unsteady",

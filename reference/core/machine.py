@@ -46,6 +46,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
+from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.shares import CONSISTENT
 from crossbody.reference.kinds import Bytes, Floats
 
@@ -336,6 +337,22 @@ def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
 
 @compiled
+def _stays(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether loops hold contact i, which stands at its surface: with what it presses no law says, as just below it."""
+    if not (s.frictional and s.loops and has_friction(m, i) and abs(w.rate[i]) <= slow(s)):
+        return False
+    held = False
+    mode[i] = active_mode(s, m, w, i)
+    activate(s, m, w, mode)
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL) == 0:
+        for j in range(s.na):
+            held = held or (w.idx[j] == i and is_idle(w, j))
+    mode[i] = FREE
+    activate(s, m, w, mode)
+    return held
+
+
+@compiled
 def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the level machine puts row i at this instant."""
     h, rate = w.gap[i], w.rate[i]
@@ -355,7 +372,7 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return active_mode(s, m, w, i)
     if h < -max(DEEP, known(s, w)):
         return active_mode(s, m, w, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
-    if rate <= slow(s) and _would_press(K, s, m, w, mode, i, collides):
+    if rate <= slow(s) and (_would_press(K, s, m, w, mode, i, collides) or _stays(K, s, m, w, mode, i)):
         return active_mode(s, m, w, i)
     return FREE
 

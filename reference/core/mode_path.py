@@ -16,8 +16,8 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.friction import bound, decided_to, has_friction, is_dry
 from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
-from crossbody.reference.core.mode_search import change, judge, sweep
-from crossbody.reference.core.mode_set import first_row, jammed, size_along
+from crossbody.reference.core.mode_search import change, goes_on, judge, sweep
+from crossbody.reference.core.mode_set import first_row, size_along
 
 CHANGES = 12  # of modes on the way, for every contact
 WHOLE = 1.0  # of the way to a set's multipliers,
@@ -84,7 +84,7 @@ def approached(s: Any, m: Model, w: Work) -> bool:
     for _ in range(changes):
         worst = judge(s, m, w)
         if worst < 0:
-            return jammed(s, m, w) < 0
+            return goes_on(s, m, w)
         i, becomes, part = _first_to_yield(s, m, w)
         _go(s, w, part)
         if i < 0:

@@ -109,6 +109,18 @@ def judge(s: Any, m: Model, w: Work) -> int:
 
 
 @compiled
+def goes_on(s: Any, m: Model, w: Work) -> bool:
+    """Whether a set that agrees with its forces does not jam; notes the contact that does.
+
+    Where no other set is consistent those forces are what the law asks for, and they press further in: Painleve.
+    """
+    contact = jammed(s, m, w)
+    if s.pressed_in < 0:
+        s.pressed_in = contact
+    return contact < 0
+
+
+@compiled
 def iterate(s: Any, m: Model, w: Work, together: int) -> bool:
     """Change the WORST of what is violated, or ALL of it together, until nothing is; False if a set comes again.
 
@@ -118,7 +130,7 @@ def iterate(s: Any, m: Model, w: Work, together: int) -> bool:
     while not _seen(s, m, w):
         i = judge(s, m, w)
         if i < 0:
-            return jammed(s, m, w) < 0
+            return goes_on(s, m, w)
         for j in range(s.na):
             k = w.idx[j]
             if has_friction(m, k) and (k == i or together == ALL) and w.wants[k] != w.state[k]:
@@ -223,14 +235,17 @@ def start_digit(state: int) -> int:
 
 @compiled
 def near_sets(s: Any, m: Model, w: Work) -> bool:
-    """Try sets by the number of contacts in which they differ from the present one; whether one is consistent."""
+    """Try sets by the number of contacts in which they differ from the present one; whether one is consistent.
+
+    If none of all is, contacts jam in one of them: without a jam in any there would be a motion.
+    """
     sweep(s, m, w)
     keep(s, w)
     contacts = 0
     for j in range(s.na):
         contacts += has_friction(m, w.idx[j])
-    tried, all_sets = 0, 4 ** min(contacts, 12)
-    for differing in range(1, contacts + 1):
+    tried, all_sets, jam = 0, 4 ** min(contacts, 12), -1
+    for differing in range(contacts + 1):
         for number in range(all_sets):
             digits, rest = 0, number
             while rest > 0:
@@ -241,9 +256,13 @@ def near_sets(s: Any, m: Model, w: Work) -> bool:
             for i in range(s.nc):
                 w.way[i] = w.kept_way[i]
             vary(s, m, w, number)
-            if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
+            if judge(s, m, w) < 0 and goes_on(s, m, w):
                 return True
+            if jam < 0:
+                jam = jammed(s, m, w)
             tried += 1
-            if tried >= MOST_SETS:
+            if tried > MOST_SETS:
                 return False
+    if s.pressed_in < 0:
+        s.pressed_in = jam
     return False

@@ -63,6 +63,15 @@ def put_as_they_are(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
+def put_as_they_stand(s: Any, m: Model, w: Work) -> None:
+    """Let all contacts that stand stick, and the others slide."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i):
+            put(m, w, i, STICK if w.stands[i] else SLIP)
+
+
+@compiled
 def put(m: Model, w: Work, i: int, state: int) -> None:
     """Let contact i stick, slide along its direction of reference, or as it does already, or be off (FREE)."""
     w.state[i] = state

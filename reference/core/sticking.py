@@ -11,9 +11,8 @@ from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_path import approached
-from crossbody.reference.core.mode_search import ALL, WORST, aim, iterate, judge, near_sets, swept, vary
+from crossbody.reference.core.mode_search import ALL, WORST, iterate, judge, near_sets, swept
 from crossbody.reference.core.mode_set import (
-    DIFFERENT,
     evaluate_set,
     first_row,
     jammed,
@@ -21,12 +20,13 @@ from crossbody.reference.core.mode_set import (
     look,
     put,
     put_as_they_are,
+    put_as_they_stand,
     put_back,
     size_along,
 )
+from crossbody.reference.core.others import count_others
 from crossbody.reference.core.slips import note_speed
 
-FEW = 64  # sets, which are all tried to see whether others are consistent as well
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 
@@ -41,60 +41,6 @@ def begin_slip(s: Any, m: Model, w: Work) -> None:
             size = size_along(m, w, i, w.la)
             for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
                 w.way[w.idx[c]] = -w.la[c] / size if size > 0.0 else 0.0
-
-
-@compiled
-def _choices(m: Model, w: Work, i: int) -> int:
-    """How many modes a contact may have: what slides goes on as it does, or presses no more."""
-    return 4 if w.stands[i] else 2
-
-
-@compiled
-def _number(s: Any, m: Model, w: Work, place: int) -> int:
-    """The number of `vary` for a place among all combinations of `_choices`."""
-    number, unit = 0, 1
-    for j in range(s.na):
-        i = w.idx[j]
-        if has_friction(m, i):
-            digit, place = place % _choices(m, w, i), place // _choices(m, w, i)
-            number += unit * (digit if w.stands[i] else 2 * digit)
-            unit *= 4
-    return number
-
-
-@compiled
-def _count_others(s: Any, m: Model, w: Work) -> None:
-    """Note whether another set is consistent as well and leads to another motion, where there are few to try.
-
-    Contacts that all slide may be such: friction makes what they do to each other no P-matrix, though it is symmetric.
-    """
-    sets = 1
-    for j in range(s.na):
-        if has_friction(m, w.idx[j]) and sets <= FEW:
-            sets *= _choices(m, w, w.idx[j])
-    if sets > FEW:
-        return
-    keep(s, w)
-    evaluate_set(s, m, w)
-    for j in range(s.na):
-        w.chosen[j] = w.excess[j]
-    for j in range(s.na):
-        if has_friction(m, w.idx[j]) and w.stands[w.idx[j]] and w.state[w.idx[j]] != SLIP:
-            aim(m, w, w.idx[j])
-    for i in range(s.nc):
-        w.kept_other[i] = w.way[i]
-    found = False
-    for place in range(1, sets):
-        for i in range(s.nc):
-            w.way[i] = w.kept_other[i]
-        vary(s, m, w, _number(s, m, w, place))
-        if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
-            for j in range(s.na):
-                found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
-    if found and s.not_unique == 0:
-        s.unique_until = s.t
-    s.not_unique += found
-    put_back(s, m, w)
 
 
 @compiled
@@ -169,14 +115,14 @@ def decide(s: Any, m: Model, w: Work) -> int:
         0, or NO_CONSISTENT_MODES or PAINLEVE; with one of these w.wants marks contacts.
     """
     note_speed(s, m, w, w.rate)
-    s.leeway, s.held_unknowns = 0.0, -1
+    s.leeway, s.held_unknowns, s.pressed_in = 0.0, -1, -1
     look(s, m, w)
     if not _found(s, m, w):
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
         if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
     _hold_what_stands(s, m, w)
-    _count_others(s, m, w)
+    count_others(s, m, w)
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
@@ -190,7 +136,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     for i in range(s.nc):
         w.off[i], w.begins[i] = 0, 0
     if s.loops and not s.indeterminate and _leaves_open(s, m, w):
-        s.indeterminate, s.determined_until = 1, s.t
+        s.indeterminate, s.loops_press, s.determined_until = 1, 1, s.t
     return 0
 
 
@@ -210,15 +156,14 @@ def _slide_on(s: Any, m: Model, w: Work) -> None:
 @compiled
 def _mark(s: Any, m: Model, w: Work) -> int:
     """Mark in w.wants the contact that has jammed, or all with friction; PAINLEVE or NO_CONSISTENT_MODES."""
-    for j in range(s.na):
-        i = w.idx[j]
-        if has_friction(m, i):
-            put(m, w, i, STICK if w.stands[i] else SLIP)
+    put_as_they_stand(s, m, w)
     evaluate_set(s, m, w)
     worst = jammed(s, m, w)
     if worst < 0:
         _slide_on(s, m, w)
         worst = jammed(s, m, w)
+    if worst < 0:
+        worst = s.pressed_in
     w.wants[:] = 0
     for j in range(s.na):
         i = w.idx[j]

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.coulomb import respond
+from crossbody.reference.core.coulomb import factor_as_held, respond
 from crossbody.reference.core.directions import lengthened
 from crossbody.reference.core.friction import has_begun, has_friction
 from crossbody.reference.core.layout import Model, Work
+
+POWERS = 8  # of the matrix of turns, to know its fastest pole
 
 
 @compiled
@@ -30,19 +32,51 @@ def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
 
 
 @compiled
-def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
-    """Fastest rate, 1/s, at which friction turns a slip into its own direction: mu lam_n / |v_t| over the mass there.
+def _spectral_radius(w: Work, count: int) -> float:
+    """Return the size of the largest eigenvalue of w.turns by the power method, from what turns itself most."""
+    x, y, size = w.turn_by, w.trial, 0.0
+    for a in range(count):
+        x[a] = 0.0
+        size = max(size, abs(w.turns[a, a]))
+    for a in range(count):
+        if abs(w.turns[a, a]) == size:
+            x[a] = 1.0
+            break
+    for _ in range(POWERS if size > 0.0 else 0):
+        total = 0.0
+        for a in range(count):
+            y[a] = 0.0
+            for b in range(count):
+                y[a] += w.turns[a, b] * x[b]
+            total += y[a] * y[a]
+        size = np.sqrt(total)
+        for a in range(count):
+            x[a] = y[a] / size if size > 0.0 else 0.0
+    return float(size)
 
-    From the last evaluation and what stands at the step's start. It grows without bound as a slip dies out.
+
+@compiled
+def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
+    """Fastest rate, 1/s, at which friction turns slips into their own directions, those that have `begun` or all.
+
+    From the last evaluation and what stands at the step's start. It grows without bound as a slip dies out, by
+    mu lam_n / |v_t| over the mass there; near a jam a turn also changes how contacts press on each other, by far more.
     """
-    fastest = 0.0
+    count = 0
     for i in range(s.nc):
         if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1 and (not begun or has_begun(w, i)):
-            c, (x, y), size = w.listed[m.tangent[i]], _across(m, w, i), _turning_slip(s, m, w, i)
-            light = x * x * w.gram[c, c] + 2.0 * x * y * w.gram[c, c + 1] + y * y * w.gram[c + 1, c + 1]
-            if size > 0.0:
-                fastest = max(fastest, m.friction[i] * w.lam0[i] * light / size)
-    return float(fastest)
+            w.turning[count] = i
+            count += 1
+    if count > 0 and s.dependent_rows > 0:
+        factor_as_held(s, m, w)  # its place is used by others
+    for b in range(count):
+        part = turn_part(s, m, w, w.turning[b])
+        for a in range(count):
+            c, (x, y), total = w.listed[m.tangent[w.turning[a]]], _across(m, w, w.turning[a]), 0.0
+            for k in range(s.na):
+                total += (x * w.gram[c, k] + y * w.gram[c + 1, k]) * w.la[k]
+            w.turns[a, b] = part * total
+    return _spectral_radius(w, count)
 
 
 @compiled

@@ -29,37 +29,48 @@ FORWARD = 1e-6  # part of what turns a slip by which one that begins may seem to
 def emerges(at: Point, i: int) -> bool:
     """Whether contact i, which slides at hardly any speed in the direction that is given, does not come to a stop."""
     alone = replace(at, emerging=np.array([i], dtype=np.int64))
-    _, vd, _ = saddle(alone)
-    gains = float(_along(alone, slip_accelerations(alone, at.q, at.v, vd))[0])
-    turns = float(_misfit_slopes(alone, vd, accelerations_by_turns(alone))[0, 0]) + gains
+    found = saddle(alone)
+    gains = float(_along(alone, slip_accelerations(alone, at.q, at.v, found[1]))[0])
+    turns = float(_misfit_slopes(alone, found[1], accelerations_by_turns(alone, *found))[0, 0]) + gains
     return gains >= -FORWARD * abs(turns)
 
 
 def emerging(at: Point, contacts: Sequence[int]) -> Point:
     """The point with contacts that emerge there, their directions, and the rates at which these turn."""
-    at = settled(replace(at, emerging=np.array(contacts, dtype=np.int64), spins=None))
-    return replace(at, spins=_spins(at)) if len(contacts) else at
+    at = replace(at, emerging=np.array(contacts, dtype=np.int64), spins=None)
+    if not len(contacts):
+        return at
+    at, found = _settled(at)
+    return replace(at, spins=_spins(at, *found))
 
 
-def _spins(at: Point) -> Floats:
-    K, vd, lam = saddle(at)
+def _spins(at: Point, K: Floats, vd: Floats, lam: Floats) -> Floats:
     q, v = at.q + 1j * STEP * at.system.rates(at.q, at.v, at.t), at.v + 1j * STEP * vd
     jerk = -np.linalg.solve(K, residual(at, q, v, at.u, vd, lam)[: len(K)].imag / STEP)[: at.system.n]
     moved = _across(at, slip_accelerations(at, q, v, vd).imag / STEP + _tangents(at) @ jerk)
-    return -np.asarray(np.linalg.solve(_misfit_slopes(at, vd, accelerations_by_turns(at)), moved), dtype=np.float64)
+    return -np.asarray(
+        np.linalg.solve(_misfit_slopes(at, vd, accelerations_by_turns(at, K, vd, lam)), moved), dtype=np.float64
+    )
 
 
 def settled(at: Point) -> Point:
     """The point with the directions in which what emerges there accelerates."""
-    for _ in range(TURNS if len(at.emerging) else 0):
-        _, vd, _ = saddle(at)
+    return _settled(at)[0] if len(at.emerging) else at
+
+
+def _settled(at: Point) -> tuple[Point, tuple[Floats, Floats, Floats]]:
+    """The same, of one at which something emerges, with what `saddle` gives there."""
+    found = saddle(at)
+    for _ in range(TURNS):
+        vd = found[1]
         wrong = _across(at, slip_accelerations(at, at.q, at.v, vd))
-        turns = -np.linalg.solve(_misfit_slopes(at, vd, accelerations_by_turns(at)), wrong)
-        for i, angle in zip(at.emerging.tolist(), turns.tolist(), strict=True):
-            at = _turned(at, i, angle)
+        turns = -np.linalg.solve(_misfit_slopes(at, vd, accelerations_by_turns(at, *found)), wrong)
         if np.abs(turns).max() <= SETTLED:
             break
-    return at
+        for i, angle in zip(at.emerging.tolist(), turns.tolist(), strict=True):
+            at = _turned(at, i, angle)
+        found = saddle(at)
+    return at, found
 
 
 def with_turns(at: Point, vd: Floats, found: Floats, turn: Floats, accelerations: Floats) -> Floats:
@@ -85,9 +96,8 @@ def by_turns(function: Callable[[Point], Array], at: Point) -> Floats:
     return np.stack(columns, axis=-1) if columns else np.zeros((len(function(at)), 0))
 
 
-def accelerations_by_turns(at: Point) -> Floats:
-    """Derivative (n, k) of the accelerations by the angles of what emerges."""
-    K, vd, lam = saddle(at)
+def accelerations_by_turns(at: Point, K: Floats, vd: Floats, lam: Floats) -> Floats:
+    """Derivative (n, k) of the accelerations by the angles of what emerges; K, vd and lam as `saddle` gives them."""
     columns = by_turns(lambda here: residual(here, at.q, at.v, at.u, vd, lam), at)
     return -np.asarray(np.linalg.solve(K, columns[: len(K)]), dtype=np.float64)[: at.system.n]
 

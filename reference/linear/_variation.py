@@ -97,7 +97,7 @@ def flow(at: Point, over: Theta) -> tuple[Floats, Floats]:
     K, vd, lam = saddle(at)
     columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
     solved = -np.asarray(np.linalg.solve(K, columns[: len(K)]), dtype=np.float64)[: at.system.n]
-    return np.concatenate([at.v, vd]), _turning(at, over, vd, solved, accelerations_by_turns(at))
+    return np.concatenate([at.v, vd]), _turning(at, over, vd, solved, accelerations_by_turns(at, K, vd, lam))
 
 
 def _turning(at: Point, over: Theta, vd: Floats, found: Floats, turn: Floats) -> Floats:

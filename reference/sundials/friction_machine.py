@@ -11,6 +11,8 @@ Where several contacts may change at once all are decided together (`mode_proble
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from crossbody.cases import Mode, Outcome
@@ -185,7 +187,7 @@ class FrictionMachine(LevelMachine):
     def _decide(self, t: float, q: Floats, v: Floats, joins: set[int], gap: Floats, rate: Floats) -> None:
         """Put the contacts that press, and those that join, in modes that agree with their forces."""
         trying = sorted({*self.contacts(), *joins})
-        found = self._decided(self.see(t, q, v, trying), joins)
+        found = self._decided(t, self.see(t, q, v, trying), joins)
         for i in trying:
             mode = found.modes[i]
             off = self.modes[i] if self.modes[i] not in ON else Mode.FREE if gap[i] > 0.0 else Mode.BALLISTIC
@@ -220,7 +222,7 @@ class FrictionMachine(LevelMachine):
             return False
         return bool(gap[i] < -self.deep or (gap[i] <= 0.0 and rate[i] <= self.slow))
 
-    def _decided(self, seen: Seen, joins: set[int]) -> Tried:
+    def _decided(self, t: float, seen: Seen, joins: set[int]) -> Tried:
         """A set of modes that agrees with its forces."""
         contacts, slides = [i for i in seen.rows if i in self.rows], dict[int, Floats]()
         slips = {i: self.sliding.slip(seen, i) for i in contacts if i in self.sliding.ways}
@@ -235,6 +237,9 @@ class FrictionMachine(LevelMachine):
         self._stands, self._limit = problem.stands, problem.limit
         found = problem.consistent()
         if found is not None:
+            several = problem.others(found)
+            self.told += Counter(["not_searched"] * (several is None) + ["not_unique"] * bool(several))
+            self.unique_until = min(self.unique_until, t) if several else self.unique_until
             return found
         ways = self._ways_of(seen) | {
             i: slip / np.linalg.norm(slip)
@@ -242,7 +247,7 @@ class FrictionMachine(LevelMachine):
             if i in joins and np.linalg.norm(slip) > self.still
         }
         modes = {i: Mode.CONTACT if i not in slips else Mode.SLIP if i in ways else Mode.STICK for i in contacts}
-        jammed = problem.jammed(modes, ways) if ways else []
+        jammed = (problem.jammed(modes, ways) if ways else []) or problem.pressed_in
         raise Ended(Outcome.PAINLEVE if jammed else Outcome.NO_CONSISTENT_MODES, jammed or contacts)
 
     def _leave_place(self, t: float, rate: Floats) -> None:

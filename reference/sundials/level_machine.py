@@ -11,6 +11,7 @@ below -1e-9 m that does not close was started in penetration: it is active if it
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -115,7 +116,7 @@ class LevelMachine:
         self._all_spent, self._shared = set[int](), -np.inf
         self.tied: dict[int, float] = {}
         self._lifted: dict[int, float] = {}
-        self.redundant = 0
+        self.redundant, self.told, self.unique_until = 0, Counter[str](), np.inf
         self._bilateral = [i for i in range(system.nc) if not self.switching[i] and self.modes[i] in ACTIVE]
         self._may_share = len(self.rows) > 1 and max(self.follows, default=-1) < 0
 

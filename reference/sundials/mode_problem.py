@@ -7,7 +7,8 @@ accelerations, by SciPy's root finder.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice, product
 
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.optimize import root
 
 from crossbody.cases import Mode
-from crossbody.reference.kinds import Floats
+from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.sundials.balance import Balance
 from crossbody.reference.sundials.equations import ULP
 from crossbody.reference.sundials.sliding import Seen, Sliding
@@ -26,6 +27,9 @@ MOST_SETS = 4096
 STAYS = 1e-7  # part of the largest acceleration, below which what begins to slide goes nowhere
 JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
 CLEAR = 1e-5  # likewise, of what goes on where others have come to a jam
+OTHERS = 64  # sets of modes, which are all tried to see whether another one agrees as well
+AROUND = 16  # directions of one contact from which its slip is looked for, for all that stand together
+OTHERWISE = 1e-6  # part of the largest acceleration by which other motions differ
 FAR = 1e6  # times what one row alone would ask for: sweeps that lead there diverge
 SETTLED = 1e-14  # part of the largest multiplier by which the last sweep changes any
 WITHIN = 1e-7  # part of its bound by which a force must stay below it to count as that of a contact that sticks
@@ -51,6 +55,9 @@ class ModeProblem:
         slides: directions of those that slide on; all others with friction stand.
         begins: directions of those that have reached their bounds.
         jams: whether some have just come to a jam.
+
+    Attributes:
+        pressed_in: contacts that jam in one of the sets, where all were tried and none agrees.
     """
 
     def __init__(
@@ -60,6 +67,7 @@ class ModeProblem:
         self.sliding, self.seen, self.slides, self.begins, self.jams = sliding, seen, slides, begins, jams
         self.stands = {i for i in contacts if i in sliding.ways} - slides.keys()
         self.modes = {i: self._pressed(i, slides) for i in contacts}
+        self.pressed_in = list[int]()
         self.scale = float(np.abs(seen.bare).max(initial=0.0))
         self.limit = AGREES * self.scale
 
@@ -67,13 +75,55 @@ class ModeProblem:
         """A set of modes that agrees with its forces, None if none is found."""
         modes = {**self.modes, **dict.fromkeys(self.begins, Mode.SLIP)}
         ways = {**self.slides, **self.begins}
-        found = self._pivoted(modes, ways) or self._swept(modes, ways) or self._searched(modes, ways)
+        found = self._pivoted(modes, ways) or self._swept(modes, ways) or self._searched(modes)
         if found is not None and (still := self._going_nowhere(found)):
             held = {i: Mode.STICK if i in still else mode for i, mode in found.modes.items()}
             tried = self._tried(held, {i: way for i, way in found.ways.items() if i not in still})
             if self._holds(tried):
                 found = tried
         return found
+
+    def others(self, found: Tried) -> bool | None:
+        """Whether another set agrees with its forces as well and moves otherwise; None if there are too many to try."""
+        if self._one_motion():
+            return False
+        if math.prod(len(self._choices(i, np.ones(1))) for i in self.modes) > OTHERS:
+            return None
+        turns = np.exp(2j * np.pi * np.linspace(0.0, 1.0, AROUND // max(len(self.stands), 1), endpoint=False))
+        return any(
+            np.abs(tried.excess - found.excess).max() > OTHERWISE * self.scale and self._holds(tried)
+            for tried in (self._tried(modes, ways) for modes, ways in self._sets(turns))
+        )
+
+    def _sets(self, turns: Array) -> Iterator[tuple[dict[int, Mode], dict[int, Floats]]]:
+        """All sets of modes, with directions from which slips that begin are looked for: what drives them, turned."""
+        for one in product(*(self._choices(i, turns) for i in self.modes)):
+            modes = dict(zip(self.modes, (mode for mode, _ in one), strict=True))
+            yield modes, {i: way for i, (mode, way) in zip(self.modes, one, strict=True) if mode == Mode.SLIP}
+
+    def _choices(self, i: int, turns: Array) -> list[tuple[Mode, Floats]]:
+        """The modes that contact i may have; see `_sets`."""
+        nothing = np.zeros(0)
+        if i not in self.sliding.ways:
+            return [(Mode.CONTACT, nothing), (Mode.FREE, nothing)]
+        off = [] if i in self.sliding.dry else [(Mode.FREE, nothing)]
+        if i in self.slides:
+            return [(Mode.SLIP, self.slides[i]), *off]
+        aim = self._aim(i)
+        ways = [aim, -aim]
+        if len(aim) > 1:
+            ways = [turn.real * aim + turn.imag * aim[::-1] * [-1.0, 1.0] for turn in turns]
+        return [(Mode.STICK, nothing), *((Mode.SLIP, way) for way in ways), *off]
+
+    def _one_motion(self) -> bool:
+        """Whether friction is too little, beside by how much rows of size 1 differ, for a second motion of any kind."""
+        balance = self._balance({i: self._pressed(i, self.slides) for i in self.modes}, self.slides)
+        A, size, count = balance.A, balance.size, balance.unknowns.count
+        if not 0 < count < len(A):  # no normal rows, or none that stands: then friction has its direction
+            return bool((np.linalg.eigvalsh(0.5 * (A + A.T)) > OTHERWISE).all())
+        friction = max((float(self.sliding.mu[i]) for i in self.stands - self.sliding.dry), default=0.0)
+        most = friction * size[count:].max() / size[:count].min() * np.linalg.norm(A[count:], 2)
+        return bool(np.linalg.eigvalsh(0.5 * (A + A.T))[0] > most + OTHERWISE)
 
     def jammed(self, modes: Mapping[int, Mode], ways: Mapping[int, Floats]) -> list[int]:
         """The contacts that slide and jam, with others or alone."""
@@ -176,22 +226,15 @@ class ModeProblem:
                     ways[i] = -force / np.linalg.norm(force)
         return None
 
-    def _searched(self, modes: dict[int, Mode], ways: dict[int, Floats]) -> Tried | None:
+    def _searched(self, modes: dict[int, Mode]) -> Tried | None:
         """Try sets by the number of contacts in which they differ from those given; none of many contacts."""
-        choices = [
-            sorted({self._pressed(i, {}) if i in self.stands else modes[i], Mode.SLIP, Mode.FREE} - {modes[i]})
-            if i in self.sliding.ways and i not in self.sliding.dry else [] for i in modes
-        ]  # fmt: skip
-        sets = [dict(zip(modes, one, strict=True)) for one in islice(
-            product(*([mode, *other] for mode, other in zip(modes.values(), choices, strict=True))), MOST_SETS
-        )]  # fmt: skip
-        for one in sorted(sets, key=lambda one: sum(one[i] != modes[i] for i in modes)):
-            aims = {i: ways.get(i, self._aim(i)) for i in one if one[i] == Mode.SLIP}
-            for sign in (1.0, -1.0):
-                turned = {i: way * (sign if i in self.stands else 1.0) for i, way in aims.items()}
-                tried = self._tried(dict(one), turned)
-                if self._holds(tried):
-                    return tried
+        jam, sets = list[int](), list(islice(self._sets(np.array([1.0, -1.0])), MOST_SETS))
+        for one, ways in sorted(sets, key=lambda other: sum(other[0][i] != modes[i] for i in modes)):
+            tried = self._tried(one, ways)
+            if self._holds(tried):
+                return tried
+            jam = jam or self.jammed(tried.modes, tried.ways)
+        self.pressed_in = jam if len(sets) < MOST_SETS else []
         return None
 
     def _aim(self, i: int) -> Floats:

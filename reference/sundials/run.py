@@ -370,9 +370,10 @@ class SundialsRun:
             events=tuple(self.machine.events),
             switches=tuple(self.discrete.switches),
             outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
-            counts=MappingProxyType(
+            unique_until=self.machine.unique_until, counts=MappingProxyType(
                 {"rhs": self.scene.evaluations}
                 | ({"redundant": self.machine.redundant} if self.machine.redundant else {})
+                | self.machine.told
             ),
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
         )  # fmt: skip

@@ -187,6 +187,8 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     short = truth.trusted < until
     told = [] if known is None else [f"Known up to {until:.4g} s: {known.why}."]
     told.append(f"{truth.source}.")
+    if many := truth.trajectory.counts.get("not_searched", 0):
+        told.append(f"At {many} instant{'s' * (many > 1)} too many contacts could change to look for a second motion.")
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
     if truth.part < 1.0:

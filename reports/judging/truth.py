@@ -213,7 +213,7 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
     if not case.general or case.chaos is not None:
         return None
     reasons = [
-        (truth.trajectory.determined_until, "the law does not say how contacts that slide share their load"),
+        (truth.trajectory.determined_until, "the law does not say how hard contacts that slide press"),
         (truth.trajectory.unique_until, "more than one set of sticking, sliding and open contacts keeps the law"),
         (_arbitrary(truth, second, case), "the law does not say which of rows that depend on each other lets go first"),
     ]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import box_on_floor, run
+from friction_scenes import box_on_floor, run, tipped
+from mode_enumeration import Contact, enumerated
 
 from crossbody import cases
 from crossbody.cases import Mode, Outcome, Trajectory
@@ -24,8 +24,8 @@ SLOPE = """<mujoco><worldbody>
   <body name="box" pos="0 0 .5"><freejoint/><geom type="box" size=".1 .1 .1" mass="1"/></body>
 </worldbody></mujoco>"""
 PARTED = 1e-6  # m
-ROUND = 40  # directions in which contacts that stand are tried to slide
-GREAT = 1e5  # times gravity: forces that are no motion's any more
+STILL = 2e-8  # m/s, below which a slip has no direction at a tolerance of 1e-9: it stands
+KNOWN = 1e-6  # part of the largest acceleration to which one is known
 NEAR = 1e-3  # of the place where forces jam
 MOST_STEPS = 10_000  # of a run in which nothing creeps
 
@@ -90,74 +90,20 @@ def dropped(seed: int) -> tuple[Any, np.ndarray, float]:
 def goes_on(scene: Any, found: Trajectory) -> bool:
     """Whether any set of modes of the contacts that close agrees with its forces where a run ended: all are tried.
 
-    Sets that jam, as springs at all contacts alike would have it, and forces beyond all measure do not count.
+    By more than a state is known to: it ends at an event, just behind which no set may agree any more.
+
+    Sets that all but jam, as springs at all contacts alike would have it, do not count.
     """
     made = system(scene, case_of(scene).law)
-    e = Equations(made)
-    rows, t, q, v = Sliding(made, e), float(found.t[-1]), found.q[-1].copy(), found.v[-1].copy()
+    rows, t = Sliding(made, e := Equations(made)), float(found.t[-1])
+    q, v = found.q[-1].copy(), found.v[-1].copy()
     gap, rate = (a.copy() for a in e.gaps(t, q, v))
     closed = [i for i in rows.ways if gap[i] <= 1e-12 and (rate[i] < 0.0 or Mode(int(found.mode[-1][i])) in (6, 7))]
     seen = rows.see(t, q, v, closed)
-    G, bare, mu = seen.G, seen.bare, rows.mu
-    choices = []
-    for i in closed:
-        slip = rows.slip(seen, i)
-        size = float(np.linalg.norm(slip))
-        if size > 1e-6:
-            choices.append([None, slip / size])
-        else:
-            angles = 2.0 * np.pi * np.arange(ROUND) / ROUND
-            choices.append([None, 0, *(np.array([np.cos(a), np.sin(a)]) for a in angles)])
-    for chosen in product(*choices):
-        W, use = [], []
-        for i, one in zip(closed, chosen, strict=True):
-            n, ways = seen.at[i], [seen.at[k] for k in rows.ways[i]]
-            if one is None:
-                continue
-            if isinstance(one, int):
-                use += [(n, np.eye(len(G))[n]), *((k, np.eye(len(G))[k]) for k in ways)]
-            else:
-                column = np.eye(len(G))[n]
-                column[ways] = -mu[i] * one
-                use.append((n, column))
-        if not use:
-            lam = np.zeros(len(G))
-        else:
-            at, W = [k for k, _ in use], np.array([column for _, column in use]).T
-            A = (G @ W)[at]
-            base = np.linalg.svd(G[np.ix_(at, at)])
-            Q = base[0][:, base[1] > 1e-10 * base[1][0]]
-            values = np.linalg.eigvals(Q.T @ A @ Q)
-            if (values.real[np.abs(values.imag) < 1e-12] < NEAR * np.abs(values).max()).any():
-                continue
-            lam = W @ np.linalg.lstsq(A, bare[at], rcond=1e-10)[0]
-        excess, scale = G @ lam - bare, np.abs(bare).max()
-        good = np.abs(lam).max() < GREAT
-        for i, one in zip(closed, chosen, strict=True):
-            n, ways = seen.at[i], [seen.at[k] for k in rows.ways[i]]
-            if one is None:
-                good &= excess[n] > -1e-6 * scale
-            else:
-                good &= lam[n] > 0.0 and abs(excess[n]) < 1e-6 * scale
-            if isinstance(one, int):
-                good &= np.linalg.norm(lam[ways]) <= mu[i] * lam[n] * (1.0 + 1e-6)
-            elif one is not None and len(choices[closed.index(i)]) > 2:
-                good &= excess[ways] @ one >= np.cos(2.0 * np.pi / ROUND) * np.linalg.norm(excess[ways])
-        if good:
-            return True
-    return False
-
-
-def jams(scene: Any, found: Trajectory) -> bool:
-    """Whether all contacts that close, each sliding along its slip, have come to where they jam together."""
-    made = system(scene, case_of(scene).law)
-    rows = Sliding(made, e := Equations(made))
-    t, q, v = float(found.t[-1]), found.q[-1].copy(), found.v[-1].copy()
-    gap, rate = (a.copy() for a in e.gaps(t, q, v))
-    closed = [i for i in rows.ways if gap[i] <= 1e-12 and rate[i] < 0.0]
-    seen = rows.see(t, q, v, closed)
-    ways = {i: slip / np.linalg.norm(slip) for i in closed if (slip := rows.slip(seen, i)).any()}
-    return min(abs(rows.jam(seen, dict.fromkeys(closed, Mode.SLIP), ways, closed[0]))) < 1e-6
+    slips = {i: slip for i in closed if np.linalg.norm(slip := rows.slip(seen, i)) > STILL}
+    contacts = [Contact(seen.at[i], [seen.at[k] for k in rows.ways[i]], rows.mu[i], slips.get(i)) for i in closed]
+    least = KNOWN * np.abs(seen.bare).max()
+    return any(one.margin > least and one.jam > NEAR for one in enumerated(seen.G, seen.bare, contacts))
 
 
 @pytest.mark.parametrize("seed", [*range(14), *(pytest.param(k, marks=pytest.mark.slow) for k in range(14, 60))])
@@ -166,7 +112,16 @@ def test_a_box_dropped_on_a_slope_ends_only_where_nothing_goes_on(seed: int) -> 
     found = run(scene, q0, np.zeros(6), 0.8, rtol=1e-9, max_steps=MOST_STEPS)
     assert np.isfinite(found.q).all()
     assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
-    assert found.outcome is Outcome.FINISHED or not goes_on(scene, found) or jams(scene, found)
+    assert found.outcome is Outcome.FINISHED or not goes_on(scene, found)
+
+
+@pytest.mark.parametrize("seed", [6, 8, 12, 39, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 40, 3))])
+def test_a_box_that_rocks_and_slides_ends_only_where_nothing_goes_on(seed: int) -> None:
+    """Three corners that come to slide at once near a jam: their directions turn as fast as friction and loads let."""
+    scene, q0 = tipped(seed)
+    found = run(scene, q0, np.zeros(6), 1.0, rtol=1e-9, max_steps=MOST_STEPS)
+    assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
+    assert found.outcome is Outcome.FINISHED or not goes_on(scene, found)
 
 
 @pytest.mark.parametrize("seed", [0, 4, 10, *(pytest.param(k, marks=pytest.mark.slow) for k in (13, 16, 17, 31))])

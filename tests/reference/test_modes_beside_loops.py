@@ -79,6 +79,15 @@ def test_a_contact_that_loops_hold_bears_nothing_and_what_slides_there_is_open(s
     assert run.determined_until == np.inf
 
 
+@pytest.mark.parametrize("gap", [0.0, -1e-15, -1e-13, -1e-11])
+def test_a_contact_that_loops_hold_at_its_surface_or_a_rounding_below_it_is_open_alike(gap: float) -> None:
+    held = linear([[0.0, 1.0], [1.0, 0.0]], [1.0, -G], 0.5, 1, loops=[[0.0, 1.0]])
+    run = simulate(held, np.array([0.0, gap]), np.zeros(2), 0.5, rtol=1e-9)
+    assert run.determined_until == 0.0
+    assert run.message.startswith("indeterminate: loops hold a contact")
+    assert run.v[-1] == pytest.approx([0.5, 0.0], abs=1e-9)
+
+
 def test_a_contact_that_loops_hold_below_its_surface_is_ill_posed() -> None:
     held = linear([[0.0, 1.0], [1.0, 0.0]], [1.0, -G], 0.5, 1, loops=[[0.0, 1.0]])
     run = simulate(held, np.array([0.0, -0.01]), np.zeros(2), 0.5, rtol=1e-9)

@@ -5,13 +5,10 @@ The second machine takes shares that are not of least norm; nothing of the rule 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
-from friction_scenes import box_on_floor, run
+from friction_scenes import box_on_floor, run, tipped
 
-from crossbody.cases.scene import RowLaw
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.balance import Balance
 
@@ -47,18 +44,6 @@ def share_otherwise(monkeypatch: pytest.MonkeyPatch, part: float) -> None:
         return lam
 
     monkeypatch.setattr(Balance, "forces", forces)
-
-
-def tipped(seed: int) -> tuple[Any, np.ndarray]:
-    """A box that falls a little turned onto a slope with much friction: it rocks, slides and comes to rest."""
-    rng = np.random.default_rng(seed)
-    tilt, mu = float(np.deg2rad(rng.uniform(0.0, 15.0))), float(rng.uniform(0.5, 1.0))
-    half = tuple(rng.uniform(0.05, 0.15, 3).tolist())
-    law = RowLaw(a0=float(10 ** rng.uniform(3.5, 4.5)), a1=float(rng.uniform(100, 200)))
-    turn, high = rng.uniform(-0.05, 0.05), half[2] + 0.02
-    return box_on_floor(mu, half=half, tilt=tilt, law=law), np.array(
-        [0, 0, high, np.cos(turn / 2), 0, np.sin(turn / 2), 0]
-    )
 
 
 @pytest.mark.parametrize("part", [0.5, -0.5])

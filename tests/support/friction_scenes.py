@@ -149,6 +149,18 @@ def piled(seed: int, kinds: tuple[str, str]) -> Any:
     return scene, np.array(q), np.array(v), mu
 
 
+def tipped(seed: int) -> tuple[Scene, np.ndarray]:
+    """A box that falls a little turned onto a slope with much friction: it rocks, slides and comes to rest."""
+    rng = np.random.default_rng(seed)
+    tilt, mu = float(np.deg2rad(rng.uniform(0.0, 15.0))), float(rng.uniform(0.5, 1.0))
+    half = tuple(rng.uniform(0.05, 0.15, 3).tolist())
+    law = RowLaw(a0=float(10 ** rng.uniform(3.5, 4.5)), a1=float(rng.uniform(100, 200)))
+    turn, high = rng.uniform(-0.05, 0.05), half[2] + 0.02
+    return box_on_floor(mu, half=half, tilt=tilt, law=law), np.array(
+        [0, 0, high, np.cos(turn / 2), 0, np.sin(turn / 2), 0]
+    )
+
+
 def rubbed_tree(seed: int, *, floor: bool = False) -> tuple[Scene, np.ndarray, np.ndarray]:
     """Return bodies on joints of which most have dry friction, with a tendon that has some, and their start.
 

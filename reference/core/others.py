@@ -1,0 +1,144 @@
+"""Whether other sets of modes are consistent as well: none can be, all few are tried, or there are too many to try."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core.friction import has_friction, is_dry
+from crossbody.reference.core.layout import SLIP, Model, Work
+from crossbody.reference.core.mode_search import aim, judge, vary
+from crossbody.reference.core.mode_set import (
+    DIFFERENT,
+    evaluate_set,
+    jammed,
+    keep,
+    put_as_they_stand,
+    put_back,
+)
+from crossbody.reference.core.unknowns import fill, list_unknowns
+from crossbody.reference.kinds import Floats
+
+FEW = 64  # sets, which are all tried
+DEFINITE = 1e-6  # square of a pivot, of rows of size 1, from which on a matrix is definite
+
+
+@compiled
+def _choices(m: Model, w: Work, i: int) -> int:
+    """How many modes a contact may have: what slides goes on as it does, or presses no more."""
+    return 4 if w.stands[i] else 2
+
+
+@compiled
+def _number(s: Any, m: Model, w: Work, place: int) -> int:
+    """The number of `vary` for a place among all combinations of `_choices`."""
+    number, unit = 0, 1
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i):
+            digit, place = place % _choices(m, w, i), place // _choices(m, w, i)
+            number += unit * (digit if w.stands[i] else 2 * digit)
+            unit *= 4
+    return number
+
+
+@compiled
+def _is_monotone(s: Any, m: Model, w: Work) -> bool:
+    """Whether no two motions can be consistent, whatever acts: then no other set has to be searched for.
+
+    With x the difference of two solutions and A the matrix in which all that stands sticks, the laws of the contacts
+    leave x.Ax <= sum mu |x_n| |(A x)_t| over those that stand: normal forces and accelerations exclude each other, and
+    friction opposes a slip with all that it has. There is none if the symmetric part of A exceeds
+    mu/2 (c x_n^2 + |(A x)_t|^2/c) for some c > 0: here c is the size of the tangential rows of A.
+    """
+    put_as_they_stand(s, m, w)
+    list_unknowns(s, m, w)
+    fill(s, m, w)
+    A, S, count = w.matrix, w.square, s.unknowns
+    for a in range(count):
+        for b in range(count):
+            S[a, b] = 0.5 * (A[a, b] + A[b, a])
+    for n in range(count):
+        i = w.idx[w.unknown[n]]
+        if has_friction(m, i) and w.stands[i] and not is_dry(m, i):
+            _take_friction(m, w, n, count)
+    return _is_definite(S, count)
+
+
+@compiled
+def _take_friction(m: Model, w: Work, n: int, count: int) -> None:
+    """Take from w.square the most that friction of the normal row at place n of the unknowns can do between two."""
+    A, S, i, size2, longer = w.matrix, w.square, w.idx[w.unknown[n]], 0.0, 1.0
+    for t in range(count):
+        if m.follows[w.idx[w.unknown[t]]] == i:
+            longer = max(longer, w.size[t] / w.size[n])
+            for b in range(count):
+                size2 += A[t, b] ** 2
+    if size2 == 0.0:
+        return
+    half = 0.5 * m.friction[i] * longer
+    S[n, n] -= half * np.sqrt(size2)
+    for t in range(count):
+        if m.follows[w.idx[w.unknown[t]]] == i:
+            for a in range(count):
+                for b in range(count):
+                    S[a, b] -= half * A[t, a] * A[t, b] / np.sqrt(size2)
+
+
+@compiled
+def _is_definite(S: Floats, n: int) -> bool:
+    """Whether a symmetric matrix, which is overwritten, is positive definite, clear of rounding."""
+    for a in range(n):
+        for b in range(a + 1):
+            total = S[a, b]
+            for c in range(b):
+                total -= S[a, c] * S[b, c]
+            if a == b:
+                if not total > DEFINITE:
+                    return False
+                S[a, a] = np.sqrt(total)
+            else:
+                S[a, b] = total / S[b, b]
+    return True
+
+
+@compiled
+def count_others(s: Any, m: Model, w: Work) -> None:
+    """Note whether another set is consistent as well and leads to another motion, or that there are too many to try.
+
+    Contacts that all slide may be such: friction makes what they do to each other no P-matrix, though it is symmetric.
+    """
+    keep(s, w)
+    if _is_monotone(s, m, w):
+        put_back(s, m, w)
+        return
+    put_back(s, m, w)
+    sets = 1
+    for j in range(s.na):
+        if has_friction(m, w.idx[j]) and sets <= FEW:
+            sets *= _choices(m, w, w.idx[j])
+    if sets > FEW:
+        s.not_searched += 1
+        return
+    evaluate_set(s, m, w)
+    for j in range(s.na):
+        w.chosen[j] = w.excess[j]
+    for j in range(s.na):
+        if has_friction(m, w.idx[j]) and w.stands[w.idx[j]] and w.state[w.idx[j]] != SLIP:
+            aim(m, w, w.idx[j])
+    for i in range(s.nc):
+        w.kept_other[i] = w.way[i]
+    found = False
+    for place in range(1, sets):
+        for i in range(s.nc):
+            w.way[i] = w.kept_other[i]
+        vary(s, m, w, _number(s, m, w, place))
+        if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
+            for j in range(s.na):
+                found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
+    if found and s.not_unique == 0:
+        s.unique_until = s.t
+    s.not_unique += found
+    put_back(s, m, w)

@@ -1,0 +1,75 @@
+"""What a mode problem ends with: motion, motions, or a jam, as the enumeration of all sets of modes has it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from friction_scenes import box_on_floor, linear, run, sphere_on_floor
+from mode_enumeration import Contact, enumerated
+
+from crossbody import cases
+from crossbody.cases import Outcome, Tier
+from crossbody.reference import simulate
+from crossbody.reports.judging.comparison import truth_row
+from crossbody.reports.measuring.truth import from_run
+
+CLEAR = 1e-3  # m/s^2, or of a determinant: below it the law is all but undecided
+CLOSING, DAMPING = 1e-3, 200.0  # m/s and 1/s, of contacts that touch
+
+
+def drawn(rng: np.random.Generator, ways: int) -> tuple[Any, Any, Any, float, list[Contact]]:
+    """Return rows, forces, velocities and mu of contacts that slide and stand, some pressed by friction of the next."""
+    k, mu = int(rng.integers(1, 4)), float(rng.uniform(0.3, 3.0))
+    rows = k * (1 + ways)
+    n = rows + int(rng.integers(0, 3))
+    H = rng.normal(size=(rows, n)) * 0.6 + np.eye(rows, n)
+    force = rng.normal(size=n) * 2.0 - H[:k].T @ np.abs(rng.normal(size=k)) * 2.0
+    slip = rng.normal(size=(k, ways))
+    slip *= (rng.random(k) < 0.6)[:, None] / np.linalg.norm(slip, axis=1)[:, None]
+    for i in np.flatnonzero(slip.any(axis=1)):
+        H[k + ways * i : k + ways * (i + 1)] -= slip[i][:, None] * rng.uniform(0.0, 2.0) / mu * H[(i + 1) % k]
+    v0 = np.linalg.lstsq(H, np.concatenate([np.full(k, -CLOSING), slip.ravel()]), rcond=None)[0]
+    places = [k + ways * i + np.arange(ways) for i in range(k)]
+    contacts = [Contact(i, places[i].tolist(), mu, slip[i] if slip[i].any() else None) for i in range(k)]
+    return H, force, v0, mu, contacts
+
+
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+@pytest.mark.parametrize("ways", [1, 2])
+@pytest.mark.parametrize("seed", [0, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, *range(4, 40)))])
+def test_a_mode_problem_ends_as_all_its_sets_have_it(seed: int, ways: int, solver: str) -> None:
+    """One motion, several, or none because contacts jam: never that no set was found where there is one."""
+    rng, ends = np.random.default_rng(seed), set[Outcome]()
+    for _ in range(10):
+        H, force, v0, mu, contacts = drawn(rng, ways)
+        bare = -H @ force
+        bare[: len(contacts)] += CLOSING * DAMPING
+        tried = enumerated(H @ H.T, bare, contacts)
+        if min(min(abs(one.margin), abs(one.jam)) for one in tried) < CLEAR:
+            continue
+        if any(one.margin > 0.0 and one.jam > 0.0 and one.pressing for one in tried):  # an even number of them: no jam
+            continue  # that forces come to gradually, which is all that a determinant tells
+        sets = {one.modes: one.excess for one in tried if one.margin > 0.0 and one.jam > 0.0}
+        motions = {tuple(np.round(excess, 6)) for excess in sets.values()}  # of one set one direction is looked for
+        made = linear(H, force, mu, len(contacts), a1=DAMPING)
+        found = simulate(made, np.zeros(len(force)), v0, 1e-9, rtol=1e-6, max_steps=400, solver=solver)
+        assert found.outcome is (Outcome.FINISHED if motions else Outcome.PAINLEVE), found.message
+        assert ("not_unique" in found.counts) == (len(motions) > 1)
+        assert (found.unique_until == 0.0) == (len(motions) > 1)
+        ends.add(found.outcome)
+    assert ends
+
+
+def test_where_a_second_motion_is_not_looked_for_is_told() -> None:
+    """Of four corners that stand there are too many sets; one contact of a sphere leaves no doubt."""
+    start = np.zeros(6), 0.1
+    box = run(box_on_floor(0.5), [0, 0, 0.1, 1, 0, 0, 0], *start)
+    case = cases.from_scene(box_on_floor(0.5), q0=[0, 0, 0.1, 1, 0, 0, 0], t_end=0.1)
+    (row,) = truth_row(case, replace(from_run(box, Tier.D, "itself"), allowed=1e-6), "")
+    assert box.counts["not_searched"] == 1
+    assert "too many contacts could change to look for a second motion" in row.why
+    sphere = run(sphere_on_floor(0.5, 0.1), [0, 0, 0.1, 1, 0, 0, 0], *start)
+    assert "not_searched" not in sphere.counts
