@@ -323,6 +323,8 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return FREE
     if kind == HANDOVER:
         return CONTACT
+    if kind == CONE and not w.begins[i]:
+        return int(mode[i])  # rows that depended on others do so no more: what that makes of the modes is decided
     if kind in (CONE, DRIFT):
         return SLIP
     if kind == STOP:
