@@ -16,7 +16,8 @@ from crossbody.reference.core.loops import eliminate
 from crossbody.reference.core.unknowns import fill, list_unknowns
 from crossbody.reference.kinds import Array
 
-REFINEMENTS = 2  # of multipliers of rows that depend on each other
+REFINEMENTS = 2  # of multipliers of rows that depend on each other,
+ROUNDED = 1e-13  # part of what is asked of the rows by which they are off by rounding alone
 GROWN = 1e-8  # pivot from which on a row does not depend on others that did
 FURTHER = 10.0  # and at least so many times what it was
 
@@ -125,8 +126,10 @@ def _off(s: Any, w: Work, la: Array) -> float:
 @compiled
 def _refine(s: Any, m: Model, w: Work, la: Array) -> None:
     """Solve again for what rows are off under la: nearly dependent ones with loads that are unlike lose digits."""
-    off = _off(s, w, la)
-    for _ in range(REFINEMENTS if off > 0.0 else 0):
+    off, asked = _off(s, w, la), 0.0
+    for a in range(s.unknowns):
+        asked += (w.pushed[w.unknown[a]] / w.size[a]) ** 2
+    for _ in range(REFINEMENTS if off > ROUNDED * np.sqrt(asked) else 0):
         refine(s, w)
         _give(s, m, w, la)
         now = _off(s, w, la)

@@ -24,7 +24,7 @@ def standing(tmp_path_factory: pytest.TempPathFactory) -> Case:
         pytest.skip(f"The robot's file {path} is not here.")
     copy = tmp_path_factory.mktemp("robot") / "go1.xml"
     copy.write_text(path.read_text(encoding="utf-8").replace("<worldbody>", FLOOR, 1), encoding="utf-8")
-    return cases.load(str(copy), "home", without="rolling", friction=1, t_end=0.35)
+    return cases.load(str(copy), "home", without="rolling", friction=1, t_end=0.28)
 
 
 def motion(case: Case, rtol: float) -> Trajectory:
@@ -48,6 +48,6 @@ def test_its_slips_do_not_depend_on_the_tolerance(standing: Case) -> None:
     assert found[1] is not None
     one, two = (list(changes(run, each)) for run, each in zip(runs, found, strict=True) if each is not None)
     assert [slides for _, slides in one] == [slides for _, slides in two]
-    assert len(one) > 10
+    assert len(one) >= 8
     assert [t for t, _ in one] == pytest.approx([t for t, _ in two], abs=1e-7)
     assert differences(runs[0].q[-1:], runs[1].q[-1:], standing.quaternions).max() < 1e-9
