@@ -96,11 +96,14 @@ def by_name(message: str, contacts: Sequence[str]) -> str:
 
 
 def within_the_model(case: Case, run: Trajectory) -> Trajectory:
-    """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for."""
+    """Return the run, or one that is inconsistent where shapes of the file meet whose contacts no row stands for.
+
+    However it ends: what came behind such a meeting is no motion of the file's.
+    """
     from crossbody.cases.files.contacts import meeting
 
-    looked = run.outcome in (Outcome.FINISHED, Outcome.TIME_LIMIT)
-    found = meeting(case, run.t, run.q, run.v) if looked else None
+    finite = np.isfinite(run.q).all(axis=1) & np.isfinite(run.v).all(axis=1)
+    found = meeting(case, run.t[finite], run.q[finite], run.v[finite])
     return replace(run, outcome=Outcome.INCONSISTENT, message=found.told) if found else run
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from types import FrameType
 
 
 def main() -> None:
     """Run the command `crossbody`."""
     signal.signal(signal.SIGINT, _leave)
+    # A stream that the caller has closed is None, and its number would be given to the next file that is opened.
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            os.dup2(os.open(os.devnull, os.O_RDWR), number)
+            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115
     os.environ.setdefault("MUJOCO_GL", "disable")  # nothing is drawn with it, and it would look for windows at length
     from crossbody.reports import cli
 

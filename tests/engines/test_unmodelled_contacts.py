@@ -46,6 +46,15 @@ def test_a_meeting_between_two_steps_is_found_where_it_is(profile: str, seed: in
     assert "'wall' and 'ball'" in run.message or "'ball' and 'wall'" in run.message
 
 
+def test_a_run_that_ends_early_behind_it_is_inconsistent_too(tmp_path: Path) -> None:
+    case = cases.load(gate(tmp_path, speed=5.0))
+    before, behind = (engines.load("reference").prepare(case, "compiled", max_steps=steps).run() for steps in (4, 5))
+    assert before.outcome is Outcome.STEP_LIMIT
+    assert before.t[-1] < 0.1996 < behind.t[-1] < case.t_end
+    assert behind.outcome is Outcome.INCONSISTENT
+    assert "come within reach at t = 0.1996 s" in behind.message
+
+
 def test_nothing_is_judged_behind_it(tmp_path: Path) -> None:
     case = cases.load(gate(tmp_path, speed=5.0))
     with pytest.raises(CaseUnsupported, match=r"gate.xml:thrown: Shapes .* come within reach at t = 0\.1996 s"):
