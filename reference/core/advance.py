@@ -62,6 +62,7 @@ from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
+STANDSTILL = 20  # switches at one instant, beside one for every row
 JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
 
 
@@ -285,6 +286,9 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     before_rows = s.rhs
     record.within_step(K, s, m, w, b.mode, b.samples, t, b.out, b.modes)
     s.trial_rhs += s.rhs - before_rows  # what is written down is no work of the method, and chooses none
+    s.standing = s.standing + 1 if fired and t == s.t_old else 0
+    if s.standing > STANDSTILL + s.nc:
+        return PAINLEVE if s.frictional and _jams(K, s, m, w, b, JAMMING) else STEP_TOO_SMALL
     if fired:
         _land(K, s, m, w)
         _remember_step(s, before)

@@ -323,7 +323,7 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return FREE
     if kind == HANDOVER:
         return CONTACT
-    if kind == CONE and not w.begins[i]:
+    if kind == CONE and s.growth >= 1.0 and not w.begins[i]:
         return int(mode[i])  # rows that depended on others do so no more: what that makes of the modes is decided
     if kind in (CONE, DRIFT):
         return SLIP

@@ -106,6 +106,7 @@ STATE = np.dtype(
         ("stalled", "i8"),
         ("cautious", "i8"),  # accepted steps until the last one that was rejected is forgotten
         ("hold", "i8"),
+        ("standing", "i8"),  # switches since time last went on
         ("promised", "f8"),  # an implicit step, by the last explicit one
         ("trial_steps", "i8"),
         ("trial_rhs", "i8"),
