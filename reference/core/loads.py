@@ -18,6 +18,7 @@ from crossbody.reference.core.unknowns import fill
 
 LIGHT = 1e-12  # part of the largest load at a contact, below which it counts as that
 SHARINGS = 3  # times that loads are shared anew: the normal ones follow from the tangential ones
+INSIDE = 1.0 - 1e-6  # part of its bound to which a contact is unburdened: loads are refined by less afterwards
 MOST_SPREADS = 200  # times more where a contact would bear more than it can: others may for it
 
 
@@ -123,7 +124,7 @@ def spread(s: Any, m: Model, w: Work) -> None:
             if spread == 0:
                 w.share2[a] = w.left2[a]
             total += w.share2[a]
-        if not most > 1.0:
+        if not most > INSIDE:
             return
         sum1, sum2 = 0.0, 0.0
         for a in range(sticking):
