@@ -12,7 +12,7 @@ from friction_scenes import account, linear, piled, random_problem, rod_on_floor
 from crossbody import cases, engines
 from crossbody.cases import Mode, Outcome, Tier, Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import RowLaw
+from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import PLACES
 from crossbody.reference import simulate
 from crossbody.reports.judging.truth import truth_of
@@ -52,15 +52,20 @@ def test_exact_motions(name: str, variant: str) -> None:
     assert np.abs(times(found) - times(exact)).max(initial=0.0) < TIME
 
 
-@pytest.mark.parametrize("seed", [0, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 53))])
-def test_both_machines_move_tossed_bodies_alike(seed: int) -> None:
-    scene, q0, v0, _ = tossed(seed)
-    at = np.linspace(0.0, 0.4, 81)
-    one = run(scene, q0, v0, 0.4, rtol=1e-11, samples=at)
-    other = run(scene, q0, v0, 0.4, rtol=1e-9, samples=at, solver="cvode")
+def moved_alike(scene: Scene, q0: Any, v0: Any, _mu: float, t_end: float) -> tuple[Trajectory, Trajectory]:
+    """Return the motions of both machines, which pass the same places and have the same events."""
+    at = np.linspace(0.0, t_end, round(200 * t_end) + 1)
+    one = run(scene, q0, v0, t_end, rtol=1e-11, samples=at)
+    other = run(scene, q0, v0, t_end, rtol=1e-9, samples=at, solver="cvode")
     assert one.outcome is other.outcome is Outcome.FINISHED, other.message
     assert np.abs(one.q - other.q).max() < STATE
     assert events(one) == events(other)
+    return one, other
+
+
+@pytest.mark.parametrize("seed", [0, 2, *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 53))])
+def test_both_machines_move_tossed_bodies_alike(seed: int) -> None:
+    one, other = moved_alike(*tossed(seed), t_end=0.4)
     assert np.abs(times(one) - times(other)).max(initial=0.0) < 1e-8
     assert account(other) < 1e-7
 
@@ -72,14 +77,7 @@ def test_both_machines_move_tossed_bodies_alike(seed: int) -> None:
 )  # fmt: skip
 def test_both_machines_move_cans_and_solids_alike(make: Any, kinds: Any) -> None:
     """They share the rows, and neither modes nor events."""
-    given = (2, kinds, 1) if make is tossed else (0, kinds)
-    scene, q0, v0, _ = make(*given)
-    at = np.linspace(0.0, 0.3, 61)
-    one = run(scene, q0, v0, 0.3, rtol=1e-11, samples=at)
-    other = run(scene, q0, v0, 0.3, rtol=1e-9, samples=at, solver="cvode")
-    assert one.outcome is other.outcome is Outcome.FINISHED, other.message
-    assert np.abs(one.q - other.q).max() < STATE
-    assert events(one) == events(other)
+    one, _ = moved_alike(*(make(2, kinds, 1) if make is tossed else make(0, kinds)), t_end=0.3)
     assert len(one.events) > 1
 
 
