@@ -254,6 +254,12 @@ def _jams(K: Any, s: Any, m: Model, w: Work, b: Buffers, near: float) -> bool:
 
 
 @compiled
+def _stuck(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Why time does not go on: contacts are about to jam, or no step is short enough."""
+    return PAINLEVE if s.frictional and _jams(K, s, m, w, b, JAMMING) else STEP_TOO_SMALL
+
+
+@compiled
 def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """One step, cut short where a machine must switch."""
     length = exact.plan(s, w, m.unilateral)
@@ -265,8 +271,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.method = EXPLICIT
         before = s.method
         code = stepping.attempt(K, s, m, w, b)
-    if code == STEP_TOO_SMALL and s.frictional and _jams(K, s, m, w, b, JAMMING):
-        return PAINLEVE
+    if code == STEP_TOO_SMALL:
+        return _stuck(K, s, m, w, b)
     if code != 0:
         return code
     code = events.scan(K, s, m, w, b.mode)
@@ -288,7 +294,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.trial_rhs += s.rhs - before_rows  # what is written down is no work of the method, and chooses none
     s.standing = s.standing + 1 if fired and t == s.t_old else 0
     if s.standing > STANDSTILL + s.nc:
-        return PAINLEVE if s.frictional and _jams(K, s, m, w, b, JAMMING) else STEP_TOO_SMALL
+        return _stuck(K, s, m, w, b)
     if fired:
         _land(K, s, m, w)
         _remember_step(s, before)

@@ -51,6 +51,12 @@ def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
 def factor_set(s: Any, m: Model, w: Work) -> None:
     """Factor A of the rows that are not off, from w.gram, w.slides and w.along."""
     s.normals = list_unknowns(s, m, w)
+    _factor_listed(s, m, w)
+
+
+@compiled
+def _factor_listed(s: Any, m: Model, w: Work) -> None:
+    """Factor A of the unknowns that are listed."""
     fill(s, m, w)
     s.rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across, s.unknowns)
     s.dependent_rows = s.unknowns - s.rank
@@ -68,12 +74,11 @@ def factor_as_held(s: Any, m: Model, w: Work) -> None:
     s.normals = list_unknowns(s, m, w)
     sticking = s.unknowns - s.normals
     if s.held_unknowns != s.unknowns or s.held_rank >= sticking:
-        factor_set(s, m, w)
+        _factor_listed(s, m, w)
         s.held_unknowns, s.growth = s.unknowns, 0.0
         s.held_rank = s.rank_second if s.dependent_rows > 0 else sticking
         s.grown = max(GROWN, FURTHER * _left(s, w))
         return
-    fill(s, m, w)
     factor_in_turn(s, m, w, s.held_rank)
     s.rank = s.rank_first + s.rank_second
     s.dependent_rows = s.unknowns - s.rank

@@ -111,10 +111,10 @@ def count_others(s: Any, m: Model, w: Work) -> None:
     Contacts that all slide may be such: friction makes what they do to each other no P-matrix, though it is symmetric.
     """
     keep(s, w)
-    if _is_monotone(s, m, w):
-        put_back(s, m, w)
-        return
+    monotone = _is_monotone(s, m, w)
     put_back(s, m, w)
+    if monotone:
+        return
     sets = 1
     for j in range(s.na):
         if has_friction(m, w.idx[j]) and sets <= FEW:
