@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from crossbody.cases.case import Case, Limit
+from crossbody.cases.friction_limits import LIMITS as FRICTION
 
 _TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from event to event"
 _FASTER = "of the tolerance, times the ratio of the fastest rate to the motion's"
@@ -23,6 +24,7 @@ _SAMPLED = "the trapezoidal rule between a run's own samples; an impact inside a
 def default_limits(case: Case) -> tuple[Limit, ...]:
     """Limits on position, velocity, force, energy, events and drift, as far as the case's rows have such numbers."""
     everyone = tuple(Limit(metric=metric, value=value, why=why) for metric, value, why in _defaults(case))
+    everyone += FRICTION if case.rubs else ()
     if not case.law.unilateral.any():
         return everyone
     located = (

@@ -11,6 +11,7 @@ OWN = (
 RIGID = (
     "rigid contacts on a grid of steps: friction begins and ends with a step, and so does what it makes of a velocity"
 )
+BOUNDED = f"{RIGID}; its friction is bounded along two axes, not in a cone"
 KNOWN = {
     ("mujoco", "default"): OWN,
     ("pinocchio", "admm"): RIGID,
@@ -19,11 +20,8 @@ KNOWN = {
         "soft contacts, one a pair of solids, where they are deepest; friction as a function of the slip, and the "
         "normal force of the step before"
     ),
-    ("dart", "matched"): f"{RIGID}; its friction is bounded along two axes, not in a cone",
-    (
-        "dart",
-        "default",
-    ): f"{RIGID}; its friction is bounded along two axes, not in a cone, and what rests is put to sleep",
+    ("dart", "matched"): BOUNDED,
+    ("dart", "default"): f"{BOUNDED}, and what rests is put to sleep",
 }
 LIMITS = tuple(
     Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)

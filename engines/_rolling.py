@@ -11,13 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from crossbody.cases import Mode, Outcome, Trajectory
+from crossbody.cases import Outcome, Trajectory
+from crossbody.cases.contacts import CLOSED
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import contacts
 
 ROLLS = 1e-3
 """Of the rate of the tilt, what of it is across the tilt in a motion that is not in a plane."""
-PRESSED = (Mode.CONTACT, Mode.STICK, Mode.SLIP)
 TILTED = 1
 """Value of the variable that says how a cylinder is, off its caps."""
 
@@ -53,7 +53,7 @@ def _rolled(run: Trajectory, variable: int, row: int, name: str) -> tuple[float,
             continue  # only samples are kept
         k, cap = int(there[-1]), row + (0 if switch.after == TILTED + 1 else 2)
         before = run.mode[there[0]]
-        if before[cap] not in PRESSED or before[cap + 1] in PRESSED:
+        if before[cap] not in CLOSED or before[cap + 1] in CLOSED:
             continue
         ahead, across = np.diff(run.gap[k : k + 2, row + 2 : row + 4] - run.gap[k : k + 2, row : row + 2], axis=0)[0]
         if abs(across) > ROLLS * np.hypot(ahead, across):

@@ -19,7 +19,6 @@ from crossbody.cases.files.assemble import assembled
 from crossbody.cases.files.controls import pushed, read_control, read_controls, under
 from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
-from crossbody.cases.friction_limits import LIMITS as FRICTION
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import check_pairs, rough
@@ -118,7 +117,7 @@ def rubbing(case: Case) -> Case | None:
         return None
     return replace(
         case, scene=scene, contacts=tuple(rows_of(scene)[0]), law=law_of(scene),
-        parameters={**case.parameters, "friction": 1}, limits=(*case.limits, *FRICTION),
+        parameters={**case.parameters, "friction": 1},
     )  # fmt: skip
 
 
@@ -210,7 +209,7 @@ def case_of(
         act0=np.zeros(0) if act0 is None else cast(Floats, act0), t_end=t_end, law=law_of(scene),
         inputs=inputs or held(scene), scene=scene, rank=rank,
         control=control, file=file, findings=findings,
-        limits=(*(AS_IT_STANDS if file else ()), *(FRICTION if scene.dry or rough(scene) else ())),
+        limits=AS_IT_STANDS if file else (),
     )  # fmt: skip
 
 
