@@ -327,8 +327,8 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return int(mode[i])  # rows that depended on others do so no more: what that makes of the modes is decided
     if kind in (CONE, DRIFT):
         return SLIP
-    if kind == STOP:
-        return STICK
+    if kind == STOP or (kind == JAM and slip(m, w, i, w.rate) <= small_slip(s)):
+        return STICK  # it has stopped as far as is known, and no direction in which it could jam
     if kind == JAM:
         return int(mode[i])  # whether any other set of modes goes on is decided with all of them
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:

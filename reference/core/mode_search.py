@@ -237,7 +237,8 @@ def start_digit(state: int) -> int:
 def near_sets(s: Any, m: Model, w: Work) -> bool:
     """Try sets by the number of contacts in which they differ from the present one; whether one is consistent.
 
-    If none of all is, contacts jam in one of them: without a jam in any there would be a motion.
+    If none of all is, contacts jam in one of them: without a jam in any there would be a motion. One that jams in a set
+    that was tried is noted where there are too many to try them all, too.
     """
     sweep(s, m, w)
     keep(s, w)
@@ -262,7 +263,9 @@ def near_sets(s: Any, m: Model, w: Work) -> bool:
                 jam = jammed(s, m, w)
             tried += 1
             if tried > MOST_SETS:
-                return False
+                break
+        if tried > MOST_SETS:
+            break
     if s.pressed_in < 0:
         s.pressed_in = jam
     return False

@@ -17,7 +17,7 @@ from crossbody.reference.core.friction import (
     slip_along,
     small_slip,
 )
-from crossbody.reference.core.guards import STOP
+from crossbody.reference.core.guards import JAM, STOP
 from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.kinds import Array
 
@@ -55,16 +55,29 @@ def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
 
 
 @compiled
-def turns_aside(s: Any, m: Model, w: Work) -> bool:
-    """Whether a contact whose slip falls to zero along its direction of reference slides on across it; rates in w.rate.
+def _has_changed(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether the slip of contact i, of rates as in w.rate, has changed by more than half since the step's start."""
+    before = slip(m, w, i, w.rates[0])
+    square = 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        square += (w.rate[t] - w.rates[0, t]) ** 2
+    return bool(before > small_slip(s) and 4.0 * square > before * before)
 
-    It has turned by a right angle within the step, and friction with it: too fast for what the step knows of any guard.
+
+@compiled
+def turns_aside(s: Any, m: Model, w: Work) -> bool:
+    """Whether what a contact does at s.theta, at rates as in w.rate, follows from how its slip turns within the step.
+
+    Friction turns with it, too fast for what the step knows of any guard. Such a contact slides on across its direction
+    of reference where its slip along it falls to zero, or jams in a direction that is another one than at the start.
     """
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == STOP:
             along = slip_along(m, w, i, w.rate)
             if slip(m, w, i, w.rate) ** 2 - along * along > small_slip(s) ** 2:
                 return True
+        if w.hit[i] <= s.theta and w.kind[i] == JAM and m.tangents[i] > 1 and _has_changed(s, m, w, i):
+            return True
     return False
 
 

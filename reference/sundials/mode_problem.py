@@ -57,7 +57,7 @@ class ModeProblem:
         jams: whether some have just come to a jam.
 
     Attributes:
-        pressed_in: contacts that jam in one of the sets, where all were tried and none agrees.
+        pressed_in: contacts that jam in one of the sets that were tried, where none agrees.
     """
 
     def __init__(
@@ -234,7 +234,7 @@ class ModeProblem:
             if self._holds(tried):
                 return tried
             jam = jam or self.jammed(tried.modes, tried.ways)
-        self.pressed_in = jam if len(sets) < MOST_SETS else []
+        self.pressed_in = jam
         return None
 
     def _aim(self, i: int) -> Floats:
