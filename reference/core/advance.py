@@ -162,11 +162,11 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             return ILL_POSED
         scatter(s, w, w.lam0)
     K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
-    if not (s.frictional and events.pulls_in_a_jam(s, m, w, b.mode)):
+    if not (s.frictional and events.pulling(s, m, w, b.mode) >= 0):
         record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
     moved, touched, stopped, drifts = False, False, False, False
-    s.jam = s.frictional and _slip_or_jam(K, s, m, w)
+    s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
@@ -208,20 +208,26 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @compiled
-def _slip_or_jam(K: Any, s: Any, m: Model, w: Work) -> bool:
+def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Let contacts that begin to slide do so against what held them; whether some have jammed.
 
-    Leaves in s.jumps whether loads do: not where a force reaches its bound or vanishes.
+    One that lets go where it pulls has jammed if its force has changed its sign through infinity. Leaves in s.jumps
+    whether loads jump: not where a force reaches its bound or vanishes.
     """
-    slips, jam, s.jumps = False, False, 0
+    slips, jam, released, s.jumps = False, False, False, 0
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
             jam = jam or w.kind[i] == guards.JAM
             slips = slips or w.kind[i] == guards.CONE
-    nq = s.nq
-    if slips and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
-        ask(BEGIN_SLIP, s, m, w, NOTHING)
+            released = released or (w.kind[i] == guards.RELEASE and b.mode[i] == SLIP)
+    nq, known = s.nq, slips or released
+    if known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
+        scatter(s, w, w.lam0)
+        pulls = events.pulling(s, m, w, b.mode) if released else -1
+        jam = jam or (pulls >= 0 and w.kind[pulls] == guards.RELEASE and ask(DETERMINANT, s, m, w, pulls) <= 0.0)
+        if slips:
+            ask(BEGIN_SLIP, s, m, w, NOTHING)
     return jam
 
 

@@ -67,6 +67,8 @@ from crossbody.reference.core.machine import active_mode, known, released_mode, 
 from crossbody.reference.core.search import first_below, opens
 from crossbody.reference.kinds import Bytes
 
+PULLS = 1e-6  # part of the largest force by which a contact pulls that is no rounding of where it lets go
+
 
 @compiled
 def _first(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> float:
@@ -290,13 +292,17 @@ def stops_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
 
 @compiled
-def pulls_in_a_jam(s: Any, m: Model, w: Work, mode: Bytes) -> bool:
-    """Whether contacts jam at s.theta, beside one that would have let go just before: forces there are no motion's."""
-    jams, pulls = False, False
+def pulling(s: Any, m: Model, w: Work, mode: Bytes) -> int:
+    """The contact that slides and pulls most, multipliers as in w.lam0; -1 if none does by more than rounding.
+
+    It has let go before, or lets go here because its force jumps: forces with it are no motion's.
+    """
+    found, most, scale = -1, 0.0, 0.0
     for i in range(s.nc):
-        jams = jams or (w.hit[i] <= s.theta and w.kind[i] == JAM)
-        pulls = pulls or (has_friction(m, i) and mode[i] == SLIP and not is_dry(m, i) and w.lam0[i] < 0.0)
-    return bool(jams and pulls)
+        scale = max(scale, abs(w.lam0[i]))
+        if has_friction(m, i) and mode[i] == SLIP and not is_dry(m, i) and w.lam0[i] < most:
+            found, most = i, w.lam0[i]
+    return found if most < -PULLS * scale else -1
 
 
 @compiled
