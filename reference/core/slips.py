@@ -18,7 +18,7 @@ from crossbody.reference.core.friction import (
     small_slip,
 )
 from crossbody.reference.core.guards import JAM, STOP
-from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
 CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip counts from none
@@ -56,11 +56,10 @@ def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
 
 @compiled
 def _has_changed(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether the slip of contact i, of rates as in w.rate, has changed by more than half since the step's start."""
-    before = slip(m, w, i, w.rates[0])
-    square = 0.0
+    """Whether the slip of contact i changes by more than half in the step: it may pass zero, and have no direction."""
+    before, square = slip(m, w, i, w.rates[0]), 0.0
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-        square += (w.rate[t] - w.rates[0, t]) ** 2
+        square += (w.rates[NODES - 1, t] - w.rates[0, t]) ** 2
     return bool(before > small_slip(s) and 4.0 * square > before * before)
 
 
@@ -69,7 +68,7 @@ def turns_aside(s: Any, m: Model, w: Work) -> bool:
     """Whether what a contact does at s.theta, at rates as in w.rate, follows from how its slip turns within the step.
 
     Friction turns with it, too fast for what the step knows of any guard. Such a contact slides on across its direction
-    of reference where its slip along it falls to zero, or jams in a direction that is another one than at the start.
+    of reference where its slip along it falls to zero, or jams in a step in which its slip changes by more than half.
     """
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == STOP:
