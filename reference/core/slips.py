@@ -17,7 +17,7 @@ from crossbody.reference.core.friction import (
     slip_along,
     small_slip,
 )
-from crossbody.reference.core.guards import JAM, STOP
+from crossbody.reference.core.guards import STOP
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
@@ -55,27 +55,28 @@ def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
 
 
 @compiled
-def _has_changed(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether the slip of contact i changes by more than half in the step: it may pass zero, and have no direction."""
-    before, square = slip(m, w, i, w.rates[0]), 0.0
+def _comes_near_zero(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether the slip of contact i loses more than half of what it is within the step: it may pass zero beside it."""
+    before, along = slip(m, w, i, w.rates[0]), 0.0
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-        square += (w.rates[NODES - 1, t] - w.rates[0, t]) ** 2
-    return bool(before > small_slip(s) and 4.0 * square > before * before)
+        along += (w.rates[0, t] - m.drift[t] - w.rest[t]) * (w.rates[NODES - 1, t] - m.drift[t] - w.rest[t])
+    return bool(before > small_slip(s) and along < 0.5 * before * before)
 
 
 @compiled
 def turns_aside(s: Any, m: Model, w: Work) -> bool:
-    """Whether what a contact does at s.theta, at rates as in w.rate, follows from how its slip turns within the step.
+    """Whether slips turn within the step, and friction with them, too fast for what it knows of any guard.
 
-    Friction turns with it, too fast for what the step knows of any guard. Such a contact slides on across its direction
-    of reference where its slip along it falls to zero, or jams in a step in which its slip changes by more than half.
+    So where a slip falls to zero along its direction of reference, and goes on across it (rates in w.rate), or comes
+    near zero while what fires at s.theta is no stop of its own.
     """
     for i in range(s.nc):
-        if w.hit[i] <= s.theta and w.kind[i] == STOP:
+        stops = w.hit[i] <= s.theta and w.kind[i] == STOP
+        if stops:
             along = slip_along(m, w, i, w.rate)
             if slip(m, w, i, w.rate) ** 2 - along * along > small_slip(s) ** 2:
                 return True
-        if w.hit[i] <= s.theta and w.kind[i] == JAM and m.tangents[i] > 1 and _has_changed(s, m, w, i):
+        elif m.tangents[i] > 1 and w.slides[i] and _comes_near_zero(s, m, w, i):
             return True
     return False
 
