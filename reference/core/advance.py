@@ -63,6 +63,7 @@ from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
 STANDSTILL = 20  # switches at one instant, beside one for every row
+SHORTER = 0.1  # the least part of a step that is taken anew because slips turn in it, wherever in it something fires
 JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
 
 
@@ -284,7 +285,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     code = events.scan(K, s, m, w, b.mode)
     if code == TOO_LONG:
         s.rejected += 1
-        s.h, s.watched = 0.5 * s.theta * s.hs, 0
+        s.h, s.watched = max(0.5 * s.theta, SHORTER) * s.hs, 0
         return 0
     s.steps += 1
     s.implicit_steps += s.method == IMPLICIT
