@@ -12,8 +12,7 @@ from crossbody.cases.errors import InvalidValue
 from crossbody.cases.errors import shown as shown  # a name of this module too
 
 _Kind = TypeVar("_Kind")
-LONGEST_NAME, LONGEST_PATH = 255, 4095
-"""Bytes that file systems take of a name, and of a whole path."""
+LONGEST_NAME, LONGEST_PATH = 255, 4095  # bytes that file systems take of a name, and of a whole path
 
 
 def instance(where: str, value: object, kind: type[_Kind] | tuple[type[_Kind], ...], wanted: str) -> _Kind:

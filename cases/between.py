@@ -10,8 +10,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.trajectory import Trajectory
 
-PARTS = 16
-"""Points looked at from each sample to the next."""
+PARTS = 16  # points looked at from each sample to the next
 
 
 def between(run: Trajectory) -> Callable[[Floats], Trajectory]:

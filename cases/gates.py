@@ -18,8 +18,7 @@ from crossbody.cases.arrays import Floats
 START, TOUCHED, SEEN = -1, -2, -3
 """What a switch is told in the place of a guard: the state where a motion starts; modes that have changed; a state that
 an engine looks at between two of its steps, which locates nothing."""
-UNCHANGED, CHANGED, LOST = range(3)
-"""What it answers; LOST ends the motion."""
+UNCHANGED, CHANGED, LOST = range(3)  # what it answers; LOST ends the motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,8 +19,7 @@ from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
 from crossbody.cases.own_file import from_file
 from crossbody.cases.scene import Scene
 
-OF_USERS = (".py", *ROBOT_FILES)
-"""How the paths of files with cases of users' own end."""
+OF_USERS = (".py", *ROBOT_FILES)  # how the paths of files with cases of users' own end
 
 
 def parted(name: str) -> tuple[str, str | None]:

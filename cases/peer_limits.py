@@ -33,8 +33,7 @@ _SLIDERS: dict[tuple[str, str], str] = _BALL | {
     ("exudyn", "matched"): TOGETHER, ("exudyn", "default"): TOGETHER, ("drake", "matched"): TOGETHER,
     ("drake", "continuous"): TOGETHER,
 }  # fmt: skip
-_LAW = (("exudyn", "matched"), ("drake", "matched"))
-"""The profiles to which the law's constants are given."""
+_LAW = (("exudyn", "matched"), ("drake", "matched"))  # the profiles to which the law's constants are given
 
 # How far each of these takes an engine at the default parameters: about twice what was measured over the variants
 # (crossbody run bouncing_ball newtons_cradle -e exudyn -e drake -e dart -e pymunk).

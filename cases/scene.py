@@ -27,8 +27,7 @@ UPRIGHT: Vector = (1.0, 0.0, 0.0, 0.0)
 UNBOUNDED: Vector = (-math.inf, math.inf)
 WIDTHS = {"free": (7, 6), "ball": (4, 3), "slide": (1, 1), "hinge": (1, 1)}
 """Coordinates and velocities of every type of joint."""
-LARGEST = 10_000
-"""Bodies of one scene."""
+LARGEST = 10_000  # bodies of one scene
 FLAT = 1e-6
 """Part of its length that is the least thickness of a hull: files have corners in single precision."""
 
@@ -231,8 +230,7 @@ def _thickness(points: tuple[Vector, ...]) -> float:
     return float(values[2] / values[0]) if len(points) > 3 and values[0] > 0.0 else 0.0
 
 
-DIMENSIONS = (1, 3, 4, 6)
-"""Of pairs: without friction, with sliding, torsional, rolling friction."""
+DIMENSIONS = (1, 3, 4, 6)  # of pairs: without friction, with sliding, torsional, rolling friction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -264,8 +262,7 @@ class Pair(_Named):
             raise SceneError(f"Pair {self.name!r}: friction is {self.friction}; it must be at least 0 and finite.")
 
 
-ROWS = {"connect": 3, "weld": 6, "joint": 1, "tendon": 1}
-"""Of every type of loop."""
+ROWS = {"connect": 3, "weld": 6, "joint": 1, "tendon": 1}  # of every type of loop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,15 +27,12 @@ highest points of a cylinder's caps, or where it stands four points of its rim; 
 if they lie along each other. Of a hull it is the most: each has as many as corners."""
 WAYS = ("t1", "t2")
 """Directions across the normal: over a plane its x and y, else those of `crossbody.reference.tree.pair_slip`."""
-Pose = tuple[Floats, Floats]
-"""Rotation (3, 3) and origin (3,), m."""
-SAME_GAP = 1e-9
-"""m, to which a bound's gap is that of two shapes: the places of bodies are rounded."""
+Pose = tuple[Floats, Floats]  # rotation (3, 3) and origin (3,), m
+SAME_GAP = 1e-9  # m, to which a bound's gap is that of two shapes: the places of bodies are rounded
 STEEPEST = 0.5
 """Largest sine between the axes of capsules that lie along each other: where they stand as a T, no end of the one is
 that of the other."""
-LEVELLED = 1e-14
-"""Sine of the angle between an axis and a plane below which it lies in it: rounding."""
+LEVELLED = 1e-14  # sine of the angle between an axis and a plane below which it lies in it: rounding
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6
 """Largest sine at which capsules lie along each other; and of the sum of two capsules' radii, by how much their gap may
 be too large that is taken where they end. Last, the largest tilt with which a cylinder stands."""

@@ -19,10 +19,8 @@ from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import STEEPEST, Contact, contacts
 from crossbody.engines.nearest import ROUND, Pose, aslant, corners, crossing, lying, meet, overlap, tilt
 
-FAR = 1.0
-"""m: the gap of a row that is none as its shapes lie."""
-TURN = 1e-3
-"""Angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it."""
+FAR = 1.0  # m: the gap of a row that is none as its shapes lie
+TURN = 1e-3  # angle or length over which H is differenced: the fourth power and rounding leave 1e-12 of it
 SHARP = 30.0
 """Times the tilt of a cap, or the squared sine at which capsules cross: part of TURN that H is differenced over."""
 MIXED = 1e-5
@@ -32,8 +30,7 @@ ONE_SIDED = np.array([[-25.0 / 12.0, 4.0, -3.0, 4.0 / 3.0, -0.25], [1.0, -4.0, 6
 """Slope at the first of five points, and what is none of a cubic through them."""
 TOGETHER = 64
 """Recorded states whose gaps are computed at once: some hundred pairs are as many arrays as memory's cache holds."""
-KEPT = 256
-"""Sets of rows whose numbers are kept."""
+KEPT = 256  # sets of rows whose numbers are kept
 MOVES = np.array([
     [0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0],
     [0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0],
@@ -43,8 +40,7 @@ MOVES = np.array([
     [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0],
 ], dtype=float)  # fmt: skip
 """Of a twist at the origin, its turning last, the rows of T but the last, which is 0."""
-Poses = Callable[[str], Pose]
-"""Body -> its pose, or its poses at some instants (..., 3, 3) and (..., 3)."""
+Poses = Callable[[str], Pose]  # body -> its pose, or its poses at some instants (..., 3, 3) and (..., 3)
 Indices = NDArray[np.intp]
 
 

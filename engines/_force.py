@@ -15,8 +15,7 @@ from crossbody.reference.cache import compiled
 
 _V = types.float64[::1]
 _SIGNATURE = types.void(types.float64, _V, _V, _V, _V)
-Acting = Callable[[float, Floats, Floats, Floats], None]
-"""(t, q, v, out): writes generalised forces."""
+Acting = Callable[[float, Floats, Floats, Floats], None]  # (t, q, v, out): writes generalised forces
 
 
 def acting(force: Force) -> Acting:

@@ -30,10 +30,8 @@ COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 GAP, PUSH, SPENT = 0, 1, 2
 """The functions watched of a row: touch or leave; turn, release or catch; hand-over."""
 SLOW, DEEP, EPS = 1e-9, 1e-9, 0.01
-NOISE = 1e-13
-"""Part of the terms of a row's acceleration that `Rows.pressure` says is their rounding."""
-PUSHES, ULP = 1e-9, float(np.finfo(float).eps)
-"""Part of the largest multiplier below which one is rounding."""
+NOISE = 1e-13  # part of the terms of a row's acceleration that `Rows.pressure` says is their rounding
+PUSHES, ULP = 1e-9, float(np.finfo(float).eps)  # part of the largest multiplier below which one is rounding
 UNMET = 1e-6
 """Of what makes up a row's acceleration: by so much more than its law asks does it part where it depends on others that
 contradict it, as of a sphere within another: no multipliers let both follow their laws, and it would have to pull."""

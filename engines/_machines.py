@@ -13,10 +13,8 @@ from crossbody.cases import Event, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
 
-WATCHED = 3
-"""Functions watched for every row; each is positive until it fires."""
-ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)
-"""Modes in which a row carries a multiplier."""
+WATCHED = 3  # functions watched for every row; each is positive until it fires
+ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL)  # modes in which a row carries a multiplier
 Fired = frozenset[tuple[int, int]]
 """(row, which of its watched functions) that reached zero at this instant."""
 Passed = tuple[int, int, int, float]

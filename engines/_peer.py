@@ -22,8 +22,7 @@ from crossbody.cases.scene_contacts import frictional
 from crossbody.engines._line import FREE, Line, why_no_line
 from crossbody.engines.contract import Run
 
-ROUNDING = 1e-9
-"""A multiplier below this part of the largest is zero where a crossing was put in."""
+ROUNDING = 1e-9  # a multiplier below this part of the largest is zero where a crossing was put in
 Crossing = tuple[int, float, Floats, Floats, int]
 """Before which sample, when (s), q and v there, and the row whose gap is zero; -1 where a force turns."""
 OPEN = float(np.finfo(np.float64).tiny)

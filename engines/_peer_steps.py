@@ -18,8 +18,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.engines._line import CONTACT, FREE, Line
 from crossbody.engines._peer import PeerRun, ended, events
 
-ROUNDING = 1e-9
-"""An impulse below this part of the momentum that a body has is none."""
+ROUNDING = 1e-9  # an impulse below this part of the momentum that a body has is none
 STEPS = Parameter(default=2_000_000, doc="bound on the number of steps", low=1, high=1e9)
 
 

@@ -16,10 +16,8 @@ from crossbody.cases.contacts import CLOSED
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import contacts
 
-ROLLS = 1e-3
-"""Of the rate of the tilt, what of it is across the tilt in a motion that is not in a plane."""
-TILTED = 1
-"""Value of the variable that says how a cylinder is, off its caps."""
+ROLLS = 1e-3  # of the rate of the tilt, what of it is across the tilt in a motion that is not in a plane
+TILTED = 1  # value of the variable that says how a cylinder is, off its caps
 
 
 def determined(scene: Scene, run: Trajectory) -> Trajectory:

@@ -25,14 +25,11 @@ from crossbody.engines._log import Log, Modes
 from crossbody.engines.contract import Run
 from crossbody.engines.nearest import across
 
-AT_GRID = 1e-9
-"""Part of a step by which an instant may be off the grid of steps."""
+AT_GRID = 1e-9  # part of a step by which an instant may be off the grid of steps
 AT_BOUND = 1e-6
 """Part of its bound, mu times the normal force, by which friction may be off it where it slides."""
-RIGID = ("constants", "H", "lam")
-"""Quantities of the audit that engines with rigid contacts do not show."""
-FASTEST = 1e6
-"""Speed, m/s or rad/s, at which a run has diverged."""
+RIGID = ("constants", "H", "lam")  # quantities of the audit that engines with rigid contacts do not show
+FASTEST = 1e6  # speed, m/s or rad/s, at which a run has diverged
 
 
 class Push(NamedTuple):

@@ -14,19 +14,16 @@ from numpy.typing import NDArray
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import STEEPEST
 
-Pose = tuple[Floats, Floats]
-"""Rotations (..., 3, 3) and positions (..., 3) in the world."""
+Pose = tuple[Floats, Floats]  # rotations (..., 3, 3) and positions (..., 3) in the world
 Places = tuple[Floats, Floats, Floats]
 """Gaps (..., places), m; unit normals from the first shape to the second, and points of the second (..., places, 3)."""
-Pair = tuple[Floats, Floats]
-"""Points of the first of two shapes, and those of the second (..., 3)."""
+Pair = tuple[Floats, Floats]  # points of the first of two shapes, and those of the second (..., 3)
 Truths = NDArray[np.bool_]
 SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in range(8)])
 """Of the corners of a box, in the order of their rows."""
 ROUND = ("box", "capsule", "hull")
 """Shapes whose places over a plane are points of theirs: corners, or the ends of an axis."""
-NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
-"""Of each axis in a vector product."""
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # of each axis in a vector product
 UP = np.array([0.0, 0.0, 1.0])
 TURNED = np.array([[0.8, -0.6, 0.0], [0.48, 0.64, -0.6], [0.36, 0.48, 0.8]])
 """Axes, by rows, in those of a shape, against whose last a frame of normals has its pole."""

@@ -18,8 +18,7 @@ from crossbody.engines._peer import HIDDEN, PeerRun, why_not
 from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
 from crossbody.engines.contract import Engine
 
-ITERATIONS = 200
-"""Of the sequential impulses: enough for five balls in a row to 1e-10 of their momentum."""
+ITERATIONS = 200  # of the sequential impulses: enough for five balls in a row to 1e-10 of their momentum
 WIDE = 1e3  # m, half the length of a plane
 PLANE = [0, 2]  # of the world's axes
 USUAL = 1.0 / 60.0  # s, the step of pymunk's own examples

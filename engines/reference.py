@@ -33,10 +33,8 @@ KEPT = "kept"
 TRACED = {KEPT: None, "yes": True, "no": False}
 """Which code of a scene's sweeps is taken: that which was compiled for this model before; or now, if need be; none."""
 _ROWS, _STATE = re.compile(r"\b[Rr]ows? \[(\d+(?:, \d+)*)\]"), re.compile(r", q = \[[^]]*\], v = \[[^]]*\]")
-LONG = 16
-"""Most numbers of a state that a message shows."""
-ROUNDING = 1e-12
-"""Change of a coordinate that is none."""
+LONG = 16  # most numbers of a state that a message shows
+ROUNDING = 1e-12  # change of a coordinate that is none
 SWITCHES = ("ledger", "shortcuts", "implicit")
 
 

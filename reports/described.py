@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from crossbody.cases import Parameter
 
-Named = dict[str, dict[str, str]]
-"""Heading -> name -> one line."""
+Named = dict[str, dict[str, str]]  # heading -> name -> one line
 EVERYTHING = "(-inf, inf)"
 
 

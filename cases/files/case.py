@@ -26,8 +26,7 @@ from crossbody.cases.scene_rows import law_of, rows_of
 
 REFERENCE_POSE, UNNAMED = "reference", "scene"
 OF_THE_FILE = -1.0
-WHERE_MET = -1
-"""Of the parameter friction: contacts that slide have rows if the motion comes to one."""
+WHERE_MET = -1  # of the parameter friction: contacts that slide have rows if the motion comes to one
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),

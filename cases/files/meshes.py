@@ -14,8 +14,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import SceneError
 from crossbody.cases.regular import open_regular
 
-BYTES = 50_000_000
-"""Of a mesh."""
+BYTES = 50_000_000  # of a mesh
 READ = (".stl", ".obj", ".msh")
 """Formats that MuJoCo reads; of the others Coal, Pinocchio's collision library, reads those that Assimp does."""
 

@@ -35,8 +35,7 @@ if TYPE_CHECKING:
 JOINTS = ("free", "ball", "slide", "hinge")
 MESH = 7
 SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box", MESH: "hull"}
-WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}
-"""MuJoCo's word for a kind of part, and ours."""
+WORDS = {"jnt": "joint", "eq": "loop", "geom": "shape"}  # MuJoCo's word for a kind of part, and ours
 JOINT_WRAP, SITE_WRAP = 1, 3
 
 

@@ -14,8 +14,7 @@ import numpy as np
 from crossbody.cases.errors import SceneError
 from crossbody.cases.scene import Pair, RowLaw
 
-SMALLEST = 1e-15
-"""Weights below it count as none."""
+SMALLEST = 1e-15  # weights below it count as none
 
 
 def pairs_of(model: Any, name: Callable[[int], str], law: Callable[[Any, Any, Any], RowLaw]) -> tuple[Pair, ...]:

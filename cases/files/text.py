@@ -12,8 +12,7 @@ from crossbody.cases.errors import SceneError
 from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import LARGEST
 
-BYTES = 50_000_000
-"""Of a file."""
+BYTES = 50_000_000  # of a file
 BODIES = ("body", "link")
 
 

@@ -10,8 +10,7 @@ from typing import Any
 
 from crossbody.cases.errors import CrossbodyError, SceneError
 
-NOT_A_NUMBER = "'NaN'"
-"""What MuJoCo's warning names; it takes such an entry as not given."""
+NOT_A_NUMBER = "'NaN'"  # what MuJoCo's warning names; it takes such an entry as not given
 
 
 @contextmanager

@@ -68,8 +68,7 @@ PARAMETERS = {
 
 TIGHT = 1e-11
 """Tolerance of the truth: what a0 makes of the rounding of a position counts in a settled contact before 1e-13."""
-LOCKED = 1e6
-"""Inertia of a locked maze, kg m^2: it turns by less than 1e-9 rad/s^2."""
+LOCKED = 1e6  # inertia of a locked maze, kg m^2: it turns by less than 1e-9 rad/s^2
 
 VARIANTS: dict[str, dict[str, Value]] = {
     "inside": {"maze_inertia": LOCKED, "side": "inner", "angle": 1e-3, "t_end": 10.0},
@@ -89,8 +88,7 @@ _TITLES = {
 _NAMES = (
     "face below", "tip below -", "tip below +", "face above", "tip above -", "tip above +", "slip below", "slip above",
 )  # fmt: skip
-NORMAL = 6
-"""Number of normal rows; slip rows follow them."""
+NORMAL = 6  # number of normal rows; slip rows follow them
 DISCRETE = ("channel", "sector below", "sector above", "controller")
 """Channel i lies outside ring i - 1; a sector is the number of a gap, or -1 on solid wall; modes of the controller are
 0 off, 1 balance, 2 snatch, 3 centre."""

@@ -52,8 +52,7 @@ _TITLES = {
 }
 
 
-SETTLED = 4.0
-"""Horizon from which on the last third of a run shows the circle alone, s."""
+SETTLED = 4.0  # horizon from which on the last third of a run shows the circle alone, s
 
 
 def _lag(p: Mapping[str, float]) -> float:

@@ -57,8 +57,7 @@ _TITLES = {
     "pendulums": "pendulums side by side, the leftmost let go",
     "unequal": "balls on a line, each lighter than the one before, so far apart that pairs collide one by one in time",
 }
-_MECHANISMS = {"unequal": "sliders"}
-"""Of the variants that are not named after theirs."""
+_MECHANISMS = {"unequal": "sliders"}  # of the variants that are not named after theirs
 _UNITS = {"sliders": "m", "pendulums": "rad"}
 PENDULUMS_S = 5.0
 

@@ -22,8 +22,7 @@ from crossbody.cases.mechanisms.red_body.order import STAGES, Fall, inequalities
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_rows import law_of
 
-_LONGER = 1.1
-"""Part by which gravity may make the blow of the right corner longer than its closed form."""
+_LONGER = 1.1  # part by which gravity may make the blow of the right corner longer than its closed form
 PARAMETERS = {
     "mass": Parameter(default=1.0, unit="kg", doc="mass of the box, uniform", low=0.0, open_low=True),
     "half_width": Parameter(default=0.1, unit="m", doc="half the width of the box", low=0.0, open_low=True),

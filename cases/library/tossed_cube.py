@@ -35,10 +35,8 @@ _TITLES = {
     "slides": "a cube is tossed on a table on which it slides",
     "tumbles": "a cube is tossed on a table on which it rolls over its edges",
 }
-TURNED = np.array([[0.4, -0.3, 0.2]])
-"""Rotation vector at the start, rad."""
-THROWN = (0.8, -0.3, 0.0, 3.0, 2.0, -1.0)
-"""Velocities at the start, m/s and rad/s."""
+TURNED = np.array([[0.4, -0.3, 0.2]])  # rotation vector at the start, rad
+THROWN = (0.8, -0.3, 0.0, 3.0, 2.0, -1.0)  # velocities at the start, m/s and rad/s
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:

@@ -20,8 +20,7 @@ from crossbody.engines._rubbing import RIGID, Push, steps_of, why_no_steps
 from crossbody.engines._scene import Forces, masses
 from crossbody.engines.nearest import Pose
 
-THICK, WIDE = 1.0, 40.0
-"""Sides of the box that stands for a plane, m."""
+THICK, WIDE = 1.0, 40.0  # sides of the box that stands for a plane, m
 HOLDS, BOUND = 1e-3, 0.9
 """Part of the gravity of a step by which places may slip that hold: DART's mixing of constraint forces leaves 1e-5 of
 what friction bears. And part of its bound below which friction holds: that is mu times the normal force of a problem

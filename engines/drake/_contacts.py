@@ -38,8 +38,7 @@ APPROXIMATIONS = {
     "sap": DiscreteContactApproximation.kSap, "lagged": DiscreteContactApproximation.kLagged,
     "similar": DiscreteContactApproximation.kSimilar, "tamsi": DiscreteContactApproximation.kTamsi,
 }  # fmt: skip
-STICTION = 1e-3
-"""Slip below which Drake holds, m/s, where nothing else is said."""
+STICTION = 1e-3  # slip below which Drake holds, m/s, where nothing else is said
 STIFF, HOLDS, QUICK = 1e7, 1e-6, 100.0
 """Of matched contacts: stiffness, N/m; slip below which they hold, m/s; dissipation (Hunt and Crossley), s/m."""
 SOFT_BOUND = 0.99

@@ -25,8 +25,7 @@ from crossbody.engines.drake._simulate import Sim
 from crossbody.engines.drake._symbolic import system
 
 SCHEMES = ("runge_kutta5", "runge_kutta3", "bogacki_shampine3", "radau3")
-USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4
-"""What a Simulator of 1.51.1 starts with."""
+USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4  # what a Simulator of 1.51.1 starts with
 RUBS = RIGID, "Contacts of a discrete plant are its own, and solved for within a step."
 
 

@@ -14,8 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 from crossbody.cases.rotations import matrices
 from crossbody.engines._line import Line
 
-THICK = 10.0
-"""Sides of the box that stands for a plane, m."""
+THICK = 10.0  # sides of the box that stands for a plane, m
 
 
 def plant(scene: Line, dt: float) -> tuple[Any, Any]:

@@ -12,8 +12,7 @@ from crossbody.cases.arrays import Floats
 
 LONGEST = 0.1  # s, Drake's own bound on a step
 SHORTEST = 1e-14  # s
-Keep = Callable[[float, Floats], object]
-"""Time, s, and state behind a step -> whether to end there."""
+Keep = Callable[[float, Floats], object]  # time, s, and state behind a step -> whether to end there
 
 
 class Sim:

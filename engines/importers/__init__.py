@@ -30,14 +30,10 @@ from crossbody.cases.errors import InvalidValue, UnknownName
 from crossbody.cases.registry import Registry
 
 REGISTRY = Registry("importer", __name__, hidden=("beside",))
-SECONDS, BYTES = 20.0, 3 << 30
-"""What an importer may take: time, s, and memory, bytes."""
-GRACE = 2.0
-"""What it has in any case when its job is there, s: it may have waited for that."""
-LATE = "It did not return within"
-"""How the sentence on an importer begins that took more than its time."""
-TOLD = 100_000
-"""Bytes of what an importer says that are read."""
+SECONDS, BYTES = 20.0, 3 << 30  # what an importer may take: time, s, and memory, bytes
+GRACE = 2.0  # what it has in any case when its job is there, s: it may have waited for that
+LATE = "It did not return within"  # how the sentence on an importer begins that took more than its time
+TOLD = 100_000  # bytes of what an importer says that are read
 WITHOUT = {"exudyn": " (its LoadURDFrobot is roboticstoolbox's)", "pymunk": "", "reference": ": it is the yardstick"}
 """Engines that there is nothing to ask."""
 PROCESS = Path(__file__).parent / "beside" / "process.py"

@@ -13,8 +13,7 @@ KINDS = {0: "slide", 1: "hinge", 2: "ball", 4: "free"}
 FIXED = 3
 SHAPES = ("", "plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "cone", "mesh")
 COLLIDES = 2
-UNSAID = 1e6
-"""Force of a joint of whose bounds nothing is said, N m or N."""
+UNSAID = 1e6  # force of a joint of whose bounds nothing is said, N m or N
 
 
 class _Robot:

@@ -13,8 +13,7 @@ from crossbody.cases.scene import Actuator, Body, Joint, Loop, RowLaw, Scene, Sh
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.engines.mujoco._direct import IMPEDANCE, solref_of
 
-POINT = 1e-15
-"""Radius of a corner, m: below the rounding of any place, and above 0, which no ball has."""
+POINT = 1e-15  # radius of a corner, m: below the rounding of any place, and above 0, which no ball has
 
 FAR = 100.0
 """Half sides of the box whose face stands for a plane that moves, m: MuJoCo's planes stand still. It rounds gaps to

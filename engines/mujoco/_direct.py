@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-MAX_IMPEDANCE = 0.9999
-"""MuJoCo clamps d there; it leaves R = (1 - d)/d diagA, a bias of 1e-4 in lam."""
+MAX_IMPEDANCE = 0.9999  # MuJoCo clamps d there; it leaves R = (1 - d)/d diagA, a bias of 1e-4 in lam
 IMPEDANCE = (MAX_IMPEDANCE, MAX_IMPEDANCE, 1e-3, 0.5, 1.0)
 """The solimp that goes with it: the same impedance at every depth."""
 REMAINING = 1e-7

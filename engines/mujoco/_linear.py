@@ -34,14 +34,10 @@ from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import constraint_jacobian, mass_matrix
 from crossbody.engines.mujoco._rows import LIMITS, TOUCH
 
-EPS = 1e-5
-"""Step of the centred differences, in the units of the coordinates."""
-ONE_SIDED = 1e-6
-"""The step that MuJoCo's documentation suggests for one-sided differences."""
-RESOLVED = 0.05
-"""Largest product of the step whose logarithm is taken and the fastest pole."""
-ONE_WAY = (*(int(kind) for kind in LIMITS), TOUCH)
-"""Rows whose force is bounded by 0."""
+EPS = 1e-5  # step of the centred differences, in the units of the coordinates
+ONE_SIDED = 1e-6  # the step that MuJoCo's documentation suggests for one-sided differences
+RESOLVED = 0.05  # largest product of the step whose logarithm is taken and the fastest pole
+ONE_WAY = (*(int(kind) for kind in LIMITS), TOUCH)  # rows whose force is bounded by 0
 HARDER = 0.1
 """Part of the softness of bounds and loops that is left here: what it makes of slopes grows by their largest entry."""
 PRESS = 10.0

@@ -15,8 +15,7 @@ FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC
 COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 TOGETHER = 1e-12
 """Part of a step within which rows cross together: which of them is located first is rounding."""
-TRIALS = 300
-"""Most that one row takes; bisection alone takes 50."""
+TRIALS = 300  # most that one row takes; bisection alone takes 50
 Sign = tuple[int, int, float]
 """(row, 0 for its gap or 1 for its multiplier, sign that it has in its present mode)."""
 WATCHED: dict[int, tuple[tuple[int, float], ...]] = {

@@ -20,10 +20,8 @@ from crossbody.engines.mujoco._locate import Locator
 from crossbody.engines.mujoco._scene import Scene
 from crossbody.engines.mujoco._tape import Tape
 
-ROUNDS = 20
-"""Of rows that open and close each other at one instant."""
-SAME_INSTANT = 100
-"""Events in a row without the time moving on that make a cycle."""
+ROUNDS = 20  # of rows that open and close each other at one instant
+SAME_INSTANT = 100  # events in a row without the time moving on that make a cycle
 
 
 def integrator(model: Any, data: Any) -> Callable[[], None]:

@@ -27,8 +27,7 @@ DRY = (int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF), int(mujoco.mjtConstraint.
 LIMITS = (mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT, mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
 TOUCH = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)
 FRICTIONAL = (mujoco.mjtConstraint.mjCNSTR_CONTACT_PYRAMIDAL,)
-Present = tuple[int, int]
-"""Where a row stands in MuJoCo's arrays, and among the scene's."""
+Present = tuple[int, int]  # where a row stands in MuJoCo's arrays, and among the scene's
 
 
 class Rows:

@@ -14,8 +14,7 @@ from crossbody.cases.scene_contacts import WAYS, Contact
 from crossbody.engines.nearest import across
 
 ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
-EDGES = 4
-"""Of the pyramid of friction of a contact with two tangents."""
+EDGES = 4  # of the pyramid of friction of a contact with two tangents
 AT_BOUND = 1e-6
 """Part of its bound, mu times the normal force, by which friction may be off it where it slides: what solvers leave."""
 

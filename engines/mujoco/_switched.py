@@ -29,16 +29,11 @@ from crossbody.engines.mujoco._rows import LIMITS, Present, Rows
 REACH = 1e-12
 """How far above its surface a row is closed, m or rad: one at rest, or one that starts at its surface, is there but for
 rounding."""
-WIDE = 0.1
-"""How far above its surface a row that is on is still a row, m or rad: further than a step goes."""
-FAR = 1e9
-"""Margin with which there is a row at any gap, m or rad."""
-OFF = -1e12
-"""Reference acceleration of a row that is off, m/s^2."""
-FEW = 4
-"""Rows for which NumPy costs more than Python: of one ten times as much."""
-LAYOUTS = 256
-"""Sets of rows and modes whose places are kept: a run has a few of them."""
+WIDE = 0.1  # how far above its surface a row that is on is still a row, m or rad: further than a step goes
+FAR = 1e9  # margin with which there is a row at any gap, m or rad
+OFF = -1e12  # reference acceleration of a row that is off, m/s^2
+FEW = 4  # rows for which NumPy costs more than Python: of one ten times as much
+LAYOUTS = 256  # sets of rows and modes whose places are kept: a run has a few of them
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 BILATERAL, COLLISION, SEPARATED = int(Mode.BILATERAL), int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 

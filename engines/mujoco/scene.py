@@ -39,8 +39,7 @@ from crossbody.engines.mujoco._scene import Scene as Prepared
 from crossbody.engines.mujoco._switched import Switched
 
 CONE = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
-FASTEST = 100.0
-"""Times the speed that a scene can have: a run has diverged."""
+FASTEST = 100.0  # times the speed that a scene can have: a run has diverged
 SLOWEST, OF_RATE, OF_ROWS = 1e-3, 0.02, 0.05
 """Largest step of the matched profile, s, and the parts that it is of the fastest time constant of forces and of that
 of rows that open: Runge-Kutta 4 leaves (1/50)^4 a time constant, and rows act for a few of theirs."""
@@ -54,8 +53,7 @@ STIFF = 1e3
 """Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
 method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
 1e-3, 1e-4 by 1e-6 (`tests/reference/test_bounds_at_rest.py`). Loops in space bear many times what moves: 1e-7."""
-ROUNDS = 3
-"""Of PGS, with one row."""
+ROUNDS = 3  # of PGS, with one row
 SOLVES = 4
 """Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
 DEPENDENT = 1e-6

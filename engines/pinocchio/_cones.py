@@ -22,10 +22,8 @@ from crossbody.engines.nearest import Pose
 from crossbody.engines.pinocchio._rows import mass_matrix, point_jacobian
 from crossbody.engines.pinocchio.scene import Bodies, Gaps, mechanics, observer
 
-RESTS = 1e-12
-"""Gap, m, below which a place counts as closed: rounding of places that rest."""
-WORST = 1e-6
-"""Largest residual of the conditions, m/s, recomputed here, that still counts as solved."""
+RESTS = 1e-12  # gap, m, below which a place counts as closed: rounding of places that rest
+WORST = 1e-6  # largest residual of the conditions, m/s, recomputed here, that still counts as solved
 LIFT = np.array([0.0, 0.0, 1.0])
 Places = tuple[Touches, list[Floats], Floats]
 """Where rows touch, frames with the normal last, and coefficients of friction (k,)."""

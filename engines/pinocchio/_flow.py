@@ -33,8 +33,7 @@ LOOKS = np.linspace(0.0, 1.0, 10)[1:-1].tolist()
 """Parts of a step at which rows are looked at that may have turned twice in it."""
 ROUNDED = 8.0 * ULP
 """Part of the largest coordinate that rounding may make of a gap: what hangs side by side touches and parts by it."""
-SAME_INSTANT = 100
-"""Events in a row without the time moving on that make a cycle."""
+SAME_INSTANT = 100  # events in a row without the time moving on that make a cycle
 
 
 class Flow:

@@ -19,16 +19,12 @@ from crossbody.engines.pinocchio._rows import ULP, PinRows
 
 FREE, CONTACT, COLLISION = int(Mode.FREE), int(Mode.CONTACT), int(Mode.COLLISION)
 GAP, TURN = 0, 1
-PUSH = 1
-"""The functions watched of a row that is free, and of one that is held."""
-SLOW = 1e-9
-"""Part of the largest rate of a gap below which it stands still."""
+PUSH = 1  # the functions watched of a row that is free, and of one that is held
+SLOW = 1e-9  # part of the largest rate of a gap below which it stands still
 WEAK = 1e-7
 """Part of the largest acceleration of a gap below which a row at rest is not pressed: an integration's error may be."""
-TIES = 1e-12
-"""Part of an approach within which two rows approach equally."""
-PER_ROW = 1000
-"""Impacts of one row at one instant that make a cycle."""
+TIES = 1e-12  # part of an approach within which two rows approach equally
+PER_ROW = 1000  # impacts of one row at one instant that make a cycle
 
 
 def constants(law: Law, row: int) -> tuple[float, float]:

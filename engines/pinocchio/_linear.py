@@ -33,10 +33,8 @@ TURNED = (
 )
 CLOSE = 2e-2
 """Size of coordinates of what moves among gates, for differences, SI: these are a few of it apart."""
-STEP = 1e-3
-"""Of the differences, as a part of the coordinates' sizes."""
-Force = Callable[[Floats, Floats], Floats]
-"""(q, v) -> a force or an acceleration."""
+STEP = 1e-3  # of the differences, as a part of the coordinates' sizes
+Force = Callable[[Floats, Floats], Floats]  # (q, v) -> a force or an acceleration
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,10 +13,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.engines.pinocchio._rows import point_jacobian
 
-ACCURACY, MU, ITERATIONS = 1e-12, 1e-10, 10
-"""Of the proximal solver."""
-LEFT = 1e-2
-"""Part of an error that an iteration may leave: ten leave nothing."""
+ACCURACY, MU, ITERATIONS = 1e-12, 1e-10, 10  # of the proximal solver
+LEFT = 1e-2  # part of an error that an iteration may leave: ten leave nothing
 
 
 class Native:

@@ -21,17 +21,14 @@ if TYPE_CHECKING:
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
-Chosen = Sequence[int] | slice
-"""Indices of rows; all of them as slice(None)."""
+Chosen = Sequence[int] | slice  # indices of rows; all of them as slice(None)
 Shared = Callable[[Floats, Floats, Any], Floats]
 """(lam (na,), J (na, nv), which rows may not pull (na,)) -> lam (na,) that exert the same forces."""
 Forces = Callable[[Floats, Floats, Floats], None]
 """(q, v, tau): writes the generalised forces tau (nv,) beside gravity and the rows, N or N m."""
 ULP = 2.3e-16
-ROUNDING = 1e-13
-"""Part of the largest term of a sum that rounding may make of the sum."""
-SMALL = 1e-14
-"""Part of the largest velocity below which a gap that is held stands still."""
+ROUNDING = 1e-13  # part of the largest term of a sum that rounding may make of the sum
+SMALL = 1e-14  # part of the largest velocity below which a gap that is held stands still
 
 
 def by_forward_dynamics(model: Any, data: Any, tau: Floats) -> Solve:

@@ -44,16 +44,13 @@ RULES_FOLLOWED = {"impulse": "sequential", "impulse_simultaneous": "simultaneous
 SMALL = 1e-4
 """Size of coordinates and rates, SI, below which they are known to the absolute tolerance alone:
 a pendulum that is let go upright moves by less for a while, and by all of it later."""
-RESTS = 1e-12
-"""Gap and rate, SI, at which a row rests at the start."""
+RESTS = 1e-12  # gap and rate, SI, at which a row rests at the start
 DIPS = 0.02
 """m: shapes further apart are not looked at for dips that begin and end in one step; a robot has hundreds of pairs,
 every one of which would have steps end where it is nearest."""
 Heights = Callable[[Floats], Floats]
-Gradients = tuple[Floats, Floats]
-"""h (n,) and H (n, nv)."""
-Placed = dict[str, tuple[int, Any]]
-"""Body -> joint that carries it, and its pose in that joint's frame."""
+Gradients = tuple[Floats, Floats]  # h (n,) and H (n, nv)
+Placed = dict[str, tuple[int, Any]]  # body -> joint that carries it, and its pose in that joint's frame
 
 
 def why_not(case: Case, profile: str) -> str | None:
@@ -328,8 +325,7 @@ def _may_depend(scene: Scene, gaps: Gaps) -> bool:
     return bool(scene.loops) or touching > 1 or (bool(bounds) and (touching > 0 or tendons))
 
 
-KEPT = 2
-"""Places at which answers are kept: the end of a step and its start, the end of the one before."""
+KEPT = 2  # places at which answers are kept: the end of a step and its start, the end of the one before
 
 
 class LastAsked:

@@ -18,12 +18,9 @@ from crossbody.hw.fitting.covariance import Layout, scatter
 from crossbody.hw.fitting.fit import Agreement
 from crossbody.hw.fitting.information import WEIGHT, information
 
-DIFFERENT = 0.01
-"""Probability, shared among all parameters, below which halves do not agree."""
-UNLIKE = 5.0
-"""Ratio of standard deviations from which on one half tells too little to be compared."""
-FEWEST = 8
-"""Samples of a channel in a half."""
+DIFFERENT = 0.01  # probability, shared among all parameters, below which halves do not agree
+UNLIKE = 5.0  # ratio of standard deviations from which on one half tells too little to be compared
+FEWEST = 8  # samples of a channel in a half
 
 
 def agreement(

@@ -26,8 +26,7 @@ from crossbody.reference import System
 Array = NDArray[np.complex128]
 STEP = 1e-30
 DELAY = "delay"
-SETTLED = 1e-6
-"""Change of a motion, as a part of its largest value, below which its steps are short enough."""
+SETTLED = 1e-6  # change of a motion, as a part of its largest value, below which its steps are short enough
 MOST_PARTS = 64
 
 

@@ -21,8 +21,7 @@ from crossbody.hw.models.contract import Model
 from crossbody.hw.windows.run import run_window
 from crossbody.hw.windows.window import Window, overlap
 
-STEP = 0.1
-"""Step of a derivative, as a part of the parameter."""
+STEP = 0.1  # step of a derivative, as a part of the parameter
 
 
 class Differences:

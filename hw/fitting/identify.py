@@ -22,10 +22,8 @@ from crossbody.hw.models.contract import Model
 from crossbody.hw.reading.log import Log
 from crossbody.hw.windows.window import Window, windows
 
-LONGEST_DELAY = 0.1
-"""Bound on an identified delay, s."""
-BUDGET = 300.0
-"""Time for a search, s."""
+LONGEST_DELAY = 0.1  # bound on an identified delay, s
+BUDGET = 300.0  # time for a search, s
 MOST_DERIVATIVES = 20_000_000
 """Derivatives by starts that "auto" lets be unknowns: 160 MB, and several times that in the search."""
 

@@ -19,10 +19,8 @@ NULL = 1e-8
 """Singular value of the derivatives, columns of norm 1, over the largest, below which a direction has no effect."""
 BELONGS = 0.3
 """Part of the largest weight of a direction from which on keeping a parameter is a good way to remove it."""
-ROUNDING = 1e-9
-"""Entry of a direction, of 1, that elimination makes of none."""
-WEIGHT = 0.05
-"""Part of the largest weight of a direction from which on a parameter belongs to it."""
+ROUNDING = 1e-9  # entry of a direction, of 1, that elimination makes of none
+WEIGHT = 0.05  # part of the largest weight of a direction from which on a parameter belongs to it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -21,11 +21,9 @@ from crossbody.hw.fitting.search import Found
 from crossbody.hw.fitting.start_noise import moves
 from crossbody.hw.models.contract import Model
 
-TOGETHER = 0.999
-"""Correlation from which on two parameters are told apart by nothing but noise."""
+TOGETHER = 0.999  # correlation from which on two parameters are told apart by nothing but noise
 ERRORS = ("rmse", "end_median", "end_90")
-EFFECTIVE = 4.0
-"""Degrees of freedom below which a standard deviation is itself hardly known."""
+EFFECTIVE = 4.0  # degrees of freedom below which a standard deviation is itself hardly known
 MEASURED = "The windows start as measured: no interval counts the noise of a start; {}."
 COUNTED = 'with starts="free" they would'
 NEVER = "where contacts open the starts cannot be unknowns"

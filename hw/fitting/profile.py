@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from crossbody.hw.fitting.deadline import TimeOver
 
 Floats = NDArray[np.float64]
-SPAN, POINTS = 3.0, 9
-"""Standard deviations on either side, and values in all (odd: one is the estimate)."""
+SPAN, POINTS = 3.0, 9  # standard deviations on either side, and values in all (odd: one is the estimate)
 
 
 def profiles(

@@ -21,8 +21,7 @@ from crossbody.hw.fitting.covariance import scatter
 from crossbody.hw.fitting.derivative import Exact
 from crossbody.hw.fitting.information import WEIGHT, information
 
-UNLIKELY = 0.01
-"""Probability, shared among all parameters, below which measured starts are refuted."""
+UNLIKELY = 0.01  # probability, shared among all parameters, below which measured starts are refuted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,8 +15,7 @@ from crossbody.cases.scene import Actuator, Body, Joint, Scene
 from crossbody.hw.models.contract import Model, Numbers, Segment
 from crossbody.reference.systems import link_chain
 
-POLE = 25.0
-"""Double pole of the joints' law, 1/s: faster than any swing, and far from stiff."""
+POLE = 25.0  # double pole of the joints' law, 1/s: faster than any swing, and far from stiff
 
 _KINDS = {
     "m": ("kg", "mass", 1e-6, 1e4), "a": ("m", "pivot to centre of mass", 0.0, 1e3),

@@ -37,8 +37,7 @@ class Segment:
     inputs: Floats = field(default_factory=lambda: np.zeros((0, 0)))
 
 
-TORQUE = "N m"
-"""Unit of the inputs of every model."""
+TORQUE = "N m"  # unit of the inputs of every model
 
 
 def read_as_they_are(model: Model, log: Log) -> tuple[Floats, Floats | None]:

@@ -30,10 +30,8 @@ from crossbody.hw.windows.rates import DEGREE, HALF, Rows, derivatives, felt
 from crossbody.hw.windows.window import recorded_inputs
 from crossbody.reference import System
 
-SINGULAR = 1e9
-"""Condition from which on a combination of inputs is lost in rounding."""
-PART = 0.1
-"""Of the largest weight of a direction: what belongs to it."""
+SINGULAR = 1e9  # condition from which on a combination of inputs is lost in rounding
+PART = 0.1  # of the largest weight of a direction: what belongs to it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

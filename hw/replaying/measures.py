@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from crossbody.cases.arrays import Floats
 from crossbody.hw.windows.whiteness import noise_level, products
 
-REACH = 0.25
-"""Largest lag that is looked at, as a part of a window."""
+REACH = 0.25  # largest lag that is looked at, as a part of a window
 RIVAL = 0.9
 """Part of the highest correlation from which on a maximum may be the delay: real models are off by that much."""
-ALIKE = 0.8
-"""Part of the correlation that noise admits, from which on two motions have the same shape."""
+ALIKE = 0.8  # part of the correlation that noise admits, from which on two motions have the same shape
 REPEATS = 0.1
 """Angle between a motion and itself moved (arc cosine of their correlation), up to which the motion repeats itself."""
 EXPLAINED = 3.0
@@ -29,8 +27,7 @@ WIDE, REAL = 4, 1e-9
 UNSURE = 3.0
 """Error of that over what one neighbour less changes: r/(1 - r) with r = sin^2(w/2), w rad a sample; 3 at 3 samples a
 period."""
-NEARER = 0.8
-"""How much nearer to 0 a maximum must be than its rival on the other side."""
+NEARER = 0.8  # how much nearer to 0 a maximum must be than its rival on the other side
 
 
 def fit(y: Floats, yhat: Floats) -> float:

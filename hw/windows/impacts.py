@@ -8,12 +8,9 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 
-PART = 0.25
-"""Of the largest acceleration of the measurement: what is smaller is no impact."""
-CLEAR = 6.0
-"""Times the noise of the second difference."""
-TOGETHER = 0.05
-"""Largest distance of impacts that are the same one, s."""
+PART = 0.25  # of the largest acceleration of the measurement: what is smaller is no impact
+CLEAR = 6.0  # times the noise of the second difference
+TOGETHER = 0.05  # largest distance of impacts that are the same one, s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

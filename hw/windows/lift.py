@@ -11,8 +11,7 @@ from crossbody.cases import SceneError
 from crossbody.reference import System
 
 Array = NDArray[np.complex128]
-SINGULAR = 1e-12
-"""Singular value of the rows, over the largest, that holds nothing."""
+SINGULAR = 1e-12  # singular value of the rows, over the largest, that holds nothing
 POLISH = 2
 """Newton steps from a closed start: one carries a complex step on, the other what rounding left of the real part."""
 

@@ -17,20 +17,15 @@ from crossbody.cases.arrays import Floats
 from crossbody.hw.windows.whiteness import noise_level
 
 Rows = NDArray[np.int64]
-HALF = 25
-"""Samples on each side."""
+HALF = 25  # samples on each side
 CHUNK = 2000
 DEGREE = 3
 WIDTHS = ((51, 3), (37, 3), (25, 3), (17, 3), (11, 2), (7, 2), (5, 1), (3, 1))
 """Samples of a stretch, and the degree of its polynomial."""
-PLACES = 8
-"""Places of an instant in a stretch, beside its middle."""
-LEVEL = 1e-3
-"""Probability that noise alone refuses a stretch by its sum of squares."""
-WORST = 5.0
-"""Times the noise that a single sample may be off."""
-SMALLEST = 1e-12
-"""Noise, as a part of the largest value: rounding of what a simulation writes."""
+PLACES = 8  # places of an instant in a stretch, beside its middle
+LEVEL = 1e-3  # probability that noise alone refuses a stretch by its sum of squares
+WORST = 5.0  # times the noise that a single sample may be off
+SMALLEST = 1e-12  # noise, as a part of the largest value: rounding of what a simulation writes
 
 
 def rates_by_fit(t: Floats, y: Floats, rows: Rows | None = None) -> Floats:

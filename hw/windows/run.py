@@ -12,8 +12,7 @@ from crossbody.hw.models.contract import Model
 from crossbody.hw.windows.window import Window
 from crossbody.reference import simulate
 
-REFERENCE = {"rtol": 1e-8}
-"""Settings of the reference: far below what a rig measures."""
+REFERENCE = {"rtol": 1e-8}  # settings of the reference: far below what a rig measures
 
 
 def run_once(case: Case, solver: str, **options: Any) -> Trajectory:

@@ -20,19 +20,14 @@ from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 
-BAND = 2.5758293035489004
-"""Quantile of the normal distribution for 99 %, two-sided."""
+BAND = 2.5758293035489004  # quantile of the normal distribution for 99 %, two-sided
 LAGS = 25
-ORDER = 5
-"""Of the autoregression that whitens an input."""
+ORDER = 5  # of the autoregression that whitens an input
 OVERSAMPLED = 12.0
 """Averages of a residual for each period of the motion's mean frequency: harmonics up to the sixth are told."""
-FEWEST = 8
-"""Averages of a window."""
-BLOCK = 50
-"""Samples over which the noise is looked at together."""
-FOURTH = np.sqrt(70.0)
-"""Size of the fourth differences of white noise of size 1."""
+FEWEST = 8  # averages of a window
+BLOCK = 50  # samples over which the noise is looked at together
+FOURTH = np.sqrt(70.0)  # size of the fourth differences of white noise of size 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -16,12 +16,9 @@ from crossbody.hw.windows.impacts import impacts, least_of
 from crossbody.hw.windows.rates import rates_by_fit
 from crossbody.hw.windows.turns import advanced
 
-FEWEST = 8
-"""Samples of a window."""
-SAME = 1e-6
-"""Of a sample: two times this near are one."""
-BESIDE = 3
-"""Samples on each side of an impact at which no polynomial through neighbours gives a rate."""
+FEWEST = 8  # samples of a window
+SAME = 1e-6  # of a sample: two times this near are one
+BESIDE = 3  # samples on each side of an impact at which no polynomial through neighbours gives a rate
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -20,11 +20,9 @@ from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.reference.linear import LinearModel, linearise
 
 CASE = "soft_contact"
-GAINS = (0.0, 20.0)
-"""k* of the curves, cm/(s N)."""
+GAINS = (0.0, 20.0)  # k* of the curves, cm/(s N)
 POINTS = 601
-FREQUENCIES = np.geomspace(1e-2, 1e4, POINTS)
-"""Of the figure, rad/s: 100 a decade."""
+FREQUENCIES = np.geomspace(1e-2, 1e4, POINTS)  # of the figure, rad/s: 100 a decade
 OUTPUTS = ("force", "block velocity")
 UNITS = {"force": "N/(m/s)", "block velocity": "1"}
 """Contact force, lam_L - lam_R, and velocity of the block, each over the velocity of the fingers."""

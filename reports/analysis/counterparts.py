@@ -28,8 +28,7 @@ SLOPE, POLES = 1e-7, 1e-6
 """Limits of a way that should be right: the ways difference something, to ten digits at best."""
 EXPLAINED = 1e-4
 """What a known property may leave unexplained of the slope: one-sided differences have six digits or five."""
-TOGETHER = 1e-2
-"""Distance of poles that count as one cluster, as a part of their modulus."""
+TOGETHER = 1e-2  # distance of poles that count as one cluster, as a part of their modulus
 SLOW = 1e-3
 """Part of the fastest pole below which a modulus does not count as a scale; 1e-9 of the largest row likewise."""
 

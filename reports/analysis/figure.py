@@ -12,8 +12,7 @@ from crossbody.reports.figures.panels import Panels
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES, LEVEL
 
-RESPONDING = 1e-12
-"""Part of the largest magnitude below which a response is none."""
+RESPONDING = 1e-12  # part of the largest magnitude below which a response is none
 
 
 def pole_figure(rows: pd.DataFrame) -> Figure:

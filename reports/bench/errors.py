@@ -17,8 +17,7 @@ from crossbody.reports.judging.truth import law_of, truth_of
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs.choice import Pick
 
-GRID = 2001
-"""Instants at which all engines are compared alike."""
+GRID = 2001  # instants at which all engines are compared alike
 
 PARTS = {
     "error_q": "position", "error_v": "velocity", "error_impulse": "lam_impulse", "error_energy": "energy_drift",

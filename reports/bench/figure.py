@@ -11,8 +11,7 @@ from crossbody.reports.figures.panels import Panels
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES
 
-APART = 1.0
-"""Decades of error between two labels of a line, twice the decades of time."""
+APART = 1.0  # decades of error between two labels of a line, twice the decades of time
 
 
 def work_precision(rows: pd.DataFrame) -> Figure:

@@ -17,8 +17,7 @@ LADDERS = {
 }
 GROWTH = 3.0
 """At most this many times what the last rung took is expected of the next: a run that failed early tells nothing."""
-PATIENCE = 2.0
-"""A rung may take this many times the longest; its steps are bounded accordingly."""
+PATIENCE = 2.0  # a rung may take this many times the longest; its steps are bounded accordingly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,8 +35,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-NATIVE = 3
-"""Runs of an engine's own loop, the shortest of which counts."""
+NATIVE = 3  # runs of an engine's own loop, the shortest of which counts
 
 
 @dataclass(slots=True)

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-FLOOR = 1e-13
-"""Errors below this are rounding: no order is fitted there."""
+FLOOR = 1e-13  # errors below this are rounding: no order is fitted there
 EXACT = 1e-11
 """Where no error is above this there is nothing left to converge: closed forms, straight lines."""
 NEAR = 10.0

@@ -21,10 +21,8 @@ from crossbody.reference import ensemble
 from crossbody.reports.bench.skip import COLUMNS, Row, ratio
 
 RTOL = 1e-9
-STEP = 1e-3
-"""Of MuJoCo, s."""
-RUNS, BATCH = 4000, 200
-"""Runs of the reference, and of MuJoCo, whose are slower."""
+STEP = 1e-3  # of MuJoCo, s
+RUNS, BATCH = 4000, 200  # runs of the reference, and of MuJoCo, whose are slower
 PAIR_RUNS, PAIRS = 1500, 4
 """Runs on one core and on two, and such pairs for each repeat: short ones find a moment with two free cores."""
 LEAST_RATIO, LEAST_TWO = 40.0, 1.7

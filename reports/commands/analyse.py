@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 
 OMEGA = np.geomspace(1e-2, 1e4, 301)
 LOCUS_POINTS = 61
-PREFIX = "analysis-"
-"""How the names of the tables begin."""
-SHOWN = 40
-"""Rows of a table that are printed."""
+PREFIX = "analysis-"  # how the names of the tables begin
+SHOWN = 40  # rows of a table that are printed
 BESIDE = ["place", "engine", "way", "slope", "poles", "verdict"]
 """Columns that are printed of the differences of engines."""
 

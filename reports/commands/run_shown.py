@@ -18,15 +18,12 @@ from crossbody.reports.judging.verdict import Regression, Row, Word
 from crossbody.reports.pages import html
 from crossbody.reports.pages.results import Times
 
-WIDTH = 120
-"""Of the table in a file or a pipe."""
-MANY = 4
-"""Cases that are named of those that an engine could not run."""
+WIDTH = 120  # of the table in a file or a pipe
+MANY = 4  # cases that are named of those that an engine could not run
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
 COLOURS = {"within": "green", "known": "yellow", "outside": "red"}
-EMPTY = {"-", "0", ""}
-"""Cells that say nothing."""
+EMPTY = {"-", "0", ""}  # cells that say nothing
 LEFT_OUT = ("in all [s]", "importer", "within", "step", "model", "known", "time [ms]")
 """Columns that go, in this order, where the table is too wide."""
 

@@ -10,8 +10,7 @@ import numpy as np
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.values import coded, number, plain
 
-ACROSS = 0.09
-"""Between two columns, part of the width."""
+ACROSS = 0.09  # between two columns, part of the width
 
 
 class Panels:

@@ -18,8 +18,7 @@ class Written(Protocol):
         """Return data and layout."""
 
 
-Figure: TypeAlias = dict[str, Any]
-"""Data and layout as plain values for plotly.js."""
+Figure: TypeAlias = dict[str, Any]  # data and layout as plain values for plotly.js
 
 
 class Kind(StrEnum):

@@ -11,8 +11,7 @@ from typing import Any
 from crossbody.reports.importers.gap import Gap
 from crossbody.reports.importers.gaps import gaps
 
-TOLERANCE = 1e-9
-"""Of the largest entry: the same physics."""
+TOLERANCE = 1e-9  # of the largest entry: the same physics
 OK, WRONG, UNSUPPORTED, FAILED, NONE, UNSEEN = "ok", "wrong", "unsupported", "failed", "-", "not shown"
 QUANTITIES = (
     "reading", "coordinates", "bodies", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping",

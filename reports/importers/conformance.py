@@ -18,8 +18,7 @@ from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPP
 from crossbody.reports.importers.declared import excused
 from crossbody.reports.importers.forms import Forms
 
-PART = 16
-"""Features that one process of an importer is asked at least."""
+PART = 16  # features that one process of an importer is asked at least
 WORST = (FAILED, WRONG, UNSUPPORTED, UNSEEN, OK, NONE)
 
 

@@ -15,8 +15,7 @@ ATTRIBUTE = re.compile(r"attribute '(\w+)' found in an? '(\w+)' tag", re.I)
 CHILD = re.compile(r"tag '(\w+)' found as a child of '(\w+)'", re.I)
 PART = re.compile(r":(\d+):.*?\b(geom|mesh|motor|general|joint|site|body|link)\b.*\bignored", re.I)
 """How one says that it leaves out a part of a line."""
-MOST = 16
-"""Lines that are tried alone, for the one that is to blame."""
+MOST = 16  # lines that are tried alone, for the one that is to blame
 OF_MASS = ("inertia", "M", "gravity", "bias", "energy")
 """What there is nothing to compare with where what is left is no robot."""
 

@@ -16,8 +16,7 @@ from xml.parsers import expat
 from crossbody.cases import CrossbodyError
 from crossbody.reports.importers.lines import Node, Place, with_lines
 
-LEVELS = 4
-"""Folders above a file that are there for its meshes."""
+LEVELS = 4  # folders above a file that are there for its meshes
 Change = Callable[[Node, Mapping[Node, Place]], None]
 
 

@@ -15,8 +15,7 @@ FLOOR = 1e-4
 """Part of the largest force that is the scale of the smallest ones: rounding is that of the sums they stand in."""
 ROUNDED = 1e-6
 """Part of the reach of a robot below which lengths have lost digits: what is far out is rounded as it is far."""
-STANDARD = 9.81
-"""Gravity, m/s^2."""
+STANDARD = 9.81  # gravity, m/s^2
 
 
 def bodies(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap]:

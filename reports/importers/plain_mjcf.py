@@ -23,8 +23,7 @@ from crossbody.reports.importers.saying import beside, numbers_of, quaternion, s
 Node = ElementTree.Element
 PLACED = ("body", "geom", "site", "camera", "inertial", "frame", "light")
 TURNS = ("quat", "euler", "axisangle", "xyaxes", "zaxis")
-WRITTEN = ("joint", "geom", "site")
-"""What takes its class's attributes as its own."""
+WRITTEN = ("joint", "geom", "site")  # what takes its class's attributes as its own
 APPLIED = ("eulerseq", "boundmass", "boundinertia", "balanceinertia", "settotalmass", "inertiagrouprange")
 """Of the compiler: what is done with, once inertias and orientations are written."""
 FOLDERS = {"meshdir": ("mesh", "hfield", "skin"), "texturedir": ("texture",)}

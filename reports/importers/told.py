@@ -13,8 +13,7 @@ from crossbody.reports.importers.causes import advice
 from crossbody.reports.importers.compare import FAILED, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
 
 LEVELS = {WRONG: "error", FAILED: "error", UNSUPPORTED: "note"}
-MARK = "Written by crossbody audit"
-"""What says that a file may be written over."""
+MARK = "Written by crossbody audit"  # what says that a file may be written over
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
@@ -31,8 +30,7 @@ def sentence(row: Row) -> str:
     return f"{row.engine}: {row.quantity}: {row.where} is {value}, and {expected} in the file."
 
 
-NAMED = 3
-"""Quantities that are named of an engine in the first sentence."""
+NAMED = 3  # quantities that are named of an engine in the first sentence
 
 
 WAYS = {

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Ledger, Trajectory
 from crossbody.cases.arrays import Floats
 
-ROOM = 64 << 20
-"""Multipliers of the answers that are kept, bytes: about a third of what they take."""
+ROOM = 64 << 20  # multipliers of the answers that are kept, bytes: about a third of what they take
 _SAMPLED = ("t", "q", "v", "gap", "lam", "energy", "mode")
 
 

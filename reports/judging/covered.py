@@ -11,8 +11,7 @@ from crossbody.reports.judging.reach import COARSE, motion
 
 LOOSE = 100.0
 """Tolerance of a second run, in units of that of the first, which tells whether their motion is known so far."""
-SAME = 1e-3
-"""Part of the time at which shapes meet by which two runs may be apart that know when."""
+SAME = 1e-3  # part of the time at which shapes meet by which two runs may be apart that know when
 
 
 def covered(case: Case, budget: float) -> Case:

@@ -13,15 +13,12 @@ from crossbody.cases import Case, Outcome, Trajectory
 if TYPE_CHECKING:
     from crossbody.engines import Run
 
-BUDGET = 5.0
-"""Time that the tightest run of a scene may take, s; its truth is about ten such runs."""
+BUDGET = 5.0  # time that the tightest run of a scene may take, s; its truth is about ten such runs
 COARSE, LEAST, MANY = 1e-9, 50, 20
 """A scene is followed so tightly as takes up to so many times the steps of a coarse run, or of the least that counts:
 of a method of order 8 the tightest takes 3 times as many, unless rounding is what its errors are made of."""
-LADDER = (1.0, 10.0, 100.0, 1000.0)
-"""Tolerances that are tried, in units of `Case.tight`."""
-BOUNDED = 2
-"""The first so many of them are left for the next where they take too many steps."""
+LADDER = (1.0, 10.0, 100.0, 1000.0)  # tolerances that are tried, in units of `Case.tight`
+BOUNDED = 2  # the first so many of them are left for the next where they take too many steps
 SHORTER = 0.1
 """Each is left for the next, too, where a run that its budget ends gets less far than this part of the coarse one:
 where stiff contacts slide steps are of low order, and a hundred times as many for four digits more."""
@@ -33,8 +30,7 @@ SHORT = {
     Outcome.PAINLEVE: "rigid bodies with dry friction have no motion beyond (Painleve)",
 }
 """Ends of the tightest run up to which a motion is compared all the same, and why not further."""
-BEFORE = 1e-6
-"""Part of the time that such a run got to by which its horizon is shorter at least."""
+BEFORE = 1e-6  # part of the time that such a run got to by which its horizon is shorter at least
 SHORTEST = 1e-3
 """Part of its horizon to which a motion is cut at most: one that gets no further stands still at an instant."""
 

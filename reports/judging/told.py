@@ -14,8 +14,7 @@ from crossbody.reports.measuring.truth import TRUTH
 WRONG = (Word.CRASHED, Word.OUTSIDE)
 SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$)")
 """What the row of a truth says of a horizon that is shorter than was asked for, or a motion that is known in part."""
-NAMED = 3
-"""Runs that the sentence names."""
+NAMED = 3  # runs that the sentence names
 
 
 @dataclass(frozen=True, slots=True)

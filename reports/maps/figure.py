@@ -58,8 +58,7 @@ def _traces(group: pd.DataFrame, column: str, name: str, style: int, legend: boo
 
 
 ENDS = (("arrived", "in the centre", "circle", COLOURS[2]), ("lost", "not there at the end", "x", COLOURS[3]))
-LINE = 17
-"""Height of one scene, pixels."""
+LINE = 17  # height of one scene, pixels
 
 
 def stability(rows: pd.DataFrame) -> Figure:
@@ -87,10 +86,8 @@ def stability(rows: pd.DataFrame) -> Figure:
     return panels.figure()
 
 
-BEST, WORST = -12.0, 2.0
-"""Decades of error that the colours tell apart."""
-FIELD = 240
-"""Height of a row of fields, pixels."""
+BEST, WORST = -12.0, 2.0  # decades of error that the colours tell apart
+FIELD = 240  # height of a row of fields, pixels
 
 
 def stress_map(cells: pd.DataFrame) -> Figure:

@@ -26,8 +26,7 @@ LARGEST_S = 3.0
 MACHINES = ("level", "memoryless")
 BESIDE = tuple(rule for rule in RULES if rule not in ("block", "memoryless"))
 """Rules whose own answer is laid beside; block gives what simultaneous does, memoryless is a line of its own."""
-LONGER = 6
-"""How often the horizon is doubled while gaps still close."""
+LONGER = 6  # how often the horizon is doubled while gaps still close
 TIE = 1e-6
 """Rules no further apart than this are told apart by their order: with springs and gaps all give the ideal pattern."""
 PATTERN = "to_sequential"

@@ -24,8 +24,7 @@ COLUMNS = (
     "engine", "profile", "change", "scene", "expected", "arrived", "outcome", "ended", "arrival", "changes", "wall_ms",
     "why",
 )  # fmt: skip
-HORIZON = 130.0
-"""Time in which the slowest maze of the map comes to the centre, s."""
+HORIZON = 130.0  # time in which the slowest maze of the map comes to the centre, s
 RTOL = 1e-8
 TUMBLES, SKIPPED = "either", "skipped"
 DEFAULT = Pick(engine="reference", profile="compiled")

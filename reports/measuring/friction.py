@@ -45,10 +45,8 @@ class Rubbing:
         return np.stack([values[:, self.pair == k].sum(axis=1) for k in np.unique(self.pair)], axis=1)
 
 
-SLOW = 1e-3
-"""Part of the largest slip, and of the largest force, below which a direction is not looked at."""
-SHORT = 1e-6
-"""m, or rad, to which positions are judged: a slide is not known to be one if it is shorter."""
+SLOW = 1e-3  # part of the largest slip, and of the largest force, below which a direction is not looked at
+SHORT = 1e-6  # m, or rad, to which positions are judged: a slide is not known to be one if it is shorter
 
 
 @remembered(4)  # every metric asks for the same

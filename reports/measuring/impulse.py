@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from crossbody.cases.arrays import Floats
 from crossbody.cases.trajectory import Event, Trajectory
 
-SAME = 1e-7
-"""Part of the horizon within which a sample and a collision are at one instant."""
+SAME = 1e-7  # part of the horizon within which a sample and a collision are at one instant
 
 
 def away(exact: Trajectory, instants: Sequence[float], t_end: float) -> NDArray[np.bool_]:

@@ -14,8 +14,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
 from crossbody.cases.trajectory import Ledger
 
-TRUTH = "truth"
-"""Name of the truth where engines have theirs, and of the row that judges it."""
+TRUTH = "truth"  # name of the truth where engines have theirs, and of the row that judges it
 LAST = 0.9
 """Part of the time for which a truth is trusted behind which it may end, so that this is between two events."""
 MOST, FEWEST = 4000, 21

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
-SAME = 1e-12
-"""Part of the horizon within which two instants are one."""
+SAME = 1e-12  # part of the horizon within which two instants are one
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:

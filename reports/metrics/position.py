@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
-SMALL, STILL = 1e-6, 1e-9
-"""A coordinate that moves less than this part of its like rests."""
+SMALL, STILL = 1e-6, 1e-9  # a coordinate that moves less than this part of its like rests
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 UNIT = "1"
 CLAIMED = False
-STILL = 1e-6
-"""A coordinate whose way is below this part of the longest of its like rests."""
+STILL = 1e-6  # a coordinate whose way is below this part of the longest of its like rests
 TURN = 0.5
 """Angle between samples, rad, beyond which they tell no turn: the rule is off by TURN^2/12 of an axis that goes round,
 and by whole turns soon."""

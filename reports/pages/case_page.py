@@ -23,8 +23,7 @@ from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results
 from crossbody.reports.runs.store import Trace
 
-PLOTTED = 900_000
-"""Room for all plots of a page, bytes; the samples of each line follow from it."""
+PLOTTED = 900_000  # room for all plots of a page, bytes; the samples of each line follow from it
 RUNS = columns(
     who="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
     wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),

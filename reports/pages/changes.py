@@ -10,8 +10,7 @@ from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.judging.verdict import Row
 
 KEY = ("case", "variant", "engine", "profile", "metric")
-MOVED = 0.1
-"""Share of its limit by which a value must move to be listed."""
+MOVED = 0.1  # share of its limit by which a value must move to be listed
 WORDS = columns(
     label="Case", who="Engine", metric="Metric", verdict_before=("Before", Kind.VERDICT), verdict=("Now", Kind.VERDICT),
     value_before=("Value before", Kind.NUMBER), value=("Value now", Kind.NUMBER), limit=("Limit", Kind.NUMBER),

@@ -20,19 +20,15 @@ from crossbody.reports.pages.strips import changing, modes
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import POINTS
 
-SAMPLE = 16
-"""Room of one sample of one line on a page, bytes (time and value as base64)."""
+SAMPLE = 16  # room of one sample of one line on a page, bytes (time and value as base64)
 FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
-BEYOND = 1.5
-"""Times the truth's largest force up to which forces are drawn."""
-ROUNDING = 1e-17
-"""Depth below which there is none, m."""
+BEYOND = 1.5  # times the truth's largest force up to which forces are drawn
+ROUNDING = 1e-17  # depth below which there is none, m
 
 
-Limits = Mapping[str, Mapping[float, str]]
-"""Metric -> what engines may reach -> how that is called."""
+Limits = Mapping[str, Mapping[float, str]]  # metric -> what engines may reach -> how that is called
 NONE: Limits = {}
 
 

@@ -10,8 +10,7 @@ from crossbody.cases import Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import rates
 
-PIECES = 400
-"""Into so many pieces a horizon is cut; shorter steps stay as they are."""
+PIECES = 400  # into so many pieces a horizon is cut; shorter steps stay as they are
 
 
 def filled(run: Trajectory, quaternions: Sequence[int] = (), pieces: int = PIECES) -> tuple[Floats, Floats]:

@@ -16,8 +16,7 @@ from crossbody.reports.figures.values import coded, plain
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.scenes.scene import slip
 
-MOST = 1000
-"""Points of one engine's line."""
+MOST = 1000  # points of one engine's line
 TEXT = (
     "For the contact with the largest load. The force of a sticking contact is inside the cone, that of a sliding one "
     "on its edge; outside, it violates Coulomb's law. In the plane of the contact, the friction force relative to mu "

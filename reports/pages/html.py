@@ -23,15 +23,13 @@ from crossbody.reports.pages.packing import packed_text, packed_value
 
 TEMPLATES = Path(__file__).parent / "templates"
 PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
-PARTS = ("page.js", "plots.js", "solids.js", "player.js")
-"""The pages' own script, in this order."""
+PARTS = ("page.js", "plots.js", "solids.js", "player.js")  # the pages' own script, in this order
 SIGNS = {
     "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·", "ledger only": "∑", "skipped": "-",
     "crashed": "!",
 }  # fmt: skip
 """A verdict is told by sign and word besides its colour."""
-MOST = 2000
-"""Rows of a table that a page shows; the file beside it has all."""
+MOST = 2000  # rows of a table that a page shows; the file beside it has all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,8 +14,7 @@ from crossbody.reports.pages.figures import robust
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 
-MOST = 1500
-"""Points of one engine's line."""
+MOST = 1500  # points of one engine's line
 TEXT = (
     "Force over penetration depth of the contact with the largest load. A spring gives a line; damping opens it to a "
     "loop whose area is the energy lost. A force below zero pulls."

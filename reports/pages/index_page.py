@@ -25,10 +25,8 @@ from crossbody.reports.pages.summary import engines
 from crossbody.reports.runs.store import load
 from crossbody.reports.runs.thin import keep
 
-SHOWN = 100
-"""Cases on one page of the index."""
-SKETCHED = 80
-"""Points of a sketch of a motion."""
+SHOWN = 100  # cases on one page of the index
+SKETCHED = 80  # points of a sketch of a motion
 
 
 def index_pages(found: Results) -> list[Page]:

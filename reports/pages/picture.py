@@ -19,13 +19,10 @@ from crossbody.reports.runs.store import Trace
 
 WIDTH, HEIGHT = 800, 500
 INK, PAPER, SOFT, PUSH = "#1a1d21", "#ffffff", "#4f5660", "#b3261e"
-TURN, TILT = 0.6, 0.35
-"""Of the camera, rad: those with which a page begins."""
+TURN, TILT = 0.6, 0.35  # of the camera, rad: those with which a page begins
 ROUND = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 33)[:-1]) for f in (np.cos, np.sin)])
-FAR = 4.0
-"""Times its own size that a mechanism goes before it is followed."""
-FORCE = 0.28
-"""Part of the height that the largest force of a motion is as long as."""
+FAR = 4.0  # times its own size that a mechanism goes before it is followed
+FORCE = 0.28  # part of the height that the largest force of a motion is as long as
 SUFFIXES = (".svg", ".png", ".gif")
 
 

@@ -19,8 +19,7 @@ from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace
 
-ROOM = 280_000
-"""Room of the motions on a page, bytes."""
+ROOM = 280_000  # room of the motions on a page, bytes
 FEWEST, MOST = 60, 900
 BLOWS = 200
 """Impulses of one engine that are drawn, and events that one steps through, evenly chosen of more."""

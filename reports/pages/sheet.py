@@ -14,8 +14,7 @@ from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep
 
-FINE = 2e-5
-"""Distance of samples over the horizon below which times are written in double precision."""
+FINE = 2e-5  # distance of samples over the horizon below which times are written in double precision
 EVENTS, SHARE = 40, 0.4
 """Events around which all samples stay, the first of them where there are very many, and their share of a line."""
 TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46

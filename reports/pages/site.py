@@ -24,8 +24,7 @@ from crossbody.reports.runs.study import read_json
 
 INDEX = "index"
 PAGE = f"{INDEX}.html"
-FULL = 2.25
-"""Cases whose plots have their usual room in a single file; those of more share it."""
+FULL = 2.25  # cases whose plots have their usual room in a single file; those of more share it
 
 
 def check(against: Path | None, others: Sequence[Path]) -> None:

@@ -18,8 +18,7 @@ MODE_COLOURS = {
     Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
     Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
 }  # fmt: skip
-LONGEST = 150
-"""Intervals of one mode in one bar; of more, the longest are drawn."""
+LONGEST = 150  # intervals of one mode in one bar; of more, the longest are drawn
 MOST_CONTACTS = 8
 
 

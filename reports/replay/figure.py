@@ -16,8 +16,7 @@ from crossbody.reports.figures.values import coded, number, plain
 GREY = "#888888"
 SIGNED = [[0.0, COLOURS[0]], [0.5, "#f4f4f4"], [1.0, COLOURS[3]]]
 """Colours from -1 over 0 to 1."""
-SIGMAS = 2.0
-"""Half of the noise band, standard deviations."""
+SIGMAS = 2.0  # half of the noise band, standard deviations
 
 
 def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:

@@ -16,8 +16,7 @@ WORSE = Limit(
     why="A fit that is worse than its start on held-out windows matches the fitted ones by chance, or compensates a "
     "defect of the model by its parameters; the scatter of estimates costs a few percent at most.",
 )  # fmt: skip
-WHOLE = 100.0
-"""What a share in percent would be at best."""
+WHOLE = 100.0  # what a share in percent would be at best
 FAILED = "A run that ends early predicts nothing after its end."
 
 

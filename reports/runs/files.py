@@ -19,8 +19,7 @@ from crossbody.cases.regular import open_regular
 
 NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.+ -]{0,200}")
 """One part of the name of a file of ours: it cannot climb out, and does not begin with a dot."""
-DEPTH = 2
-"""Folder and file: nothing of ours lies deeper."""
+DEPTH = 2  # folder and file: nothing of ours lies deeper
 
 
 def is_plain(name: object) -> bool:

@@ -36,10 +36,8 @@ LOOSER = 10.0
 MANY_STEPS, HALVINGS, LEAST_SIZES = 10_000, 5, 3
 """A step is halved twice for its study, and up to five times while that takes no more steps; a run that has more by
 itself is studied at twice and four times its step. An order needs three of them."""
-TRUTHS = 3.0
-"""A truth may take so many times as long as a run: it is two of them, at tight tolerances."""
-ENOUGH = 2000
-"""Steps of a run that is drawn as it is."""
+TRUTHS = 3.0  # a truth may take so many times as long as a run: it is two of them, at tight tolerances
+ENOUGH = 2000  # steps of a run that is drawn as it is
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
 OF_STUDIES, DEARER = 2.0, 3.0
@@ -48,8 +46,7 @@ taken to cost so many times as much."""
 FIRST, DEAR = 0.02, 12.0
 """Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
 unless its profile is asked for: engines that follow the law take their steps in Python."""
-COMPILED = ("reference", "compiled")
-"""Who follows what the truth has followed."""
+COMPILED = ("reference", "compiled")  # who follows what the truth has followed
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
 

@@ -18,8 +18,7 @@ from typing import Any
 from crossbody.cases import OutputError
 from crossbody.reports.runs import files
 
-MARKER = ".crossbody"
-"""Holds the manifest; stands in every folder that crossbody wrote."""
+MARKER = ".crossbody"  # holds the manifest; stands in every folder that crossbody wrote
 PAGES, EARLIER = "pages", "earlier"
 """What is made from the tables of all studies; what a version without manifests wrote."""
 JUDGED = frozenset({"run", "replay", "identify"})

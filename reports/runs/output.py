@@ -26,10 +26,8 @@ __all__ = ["MARKER", "check", "folder", "gather", "is_ours", "is_staged", "recov
 
 NEW, READY = ".crossbody-new.", ".crossbody-ready."
 PLAN = ".plan.json"
-HALF = f".{MARKER}."
-"""How half-written manifests begin."""
-OURS = (MARKER, HALF)
-"""How all that begins that crossbody makes in an output folder besides results."""
+HALF = f".{MARKER}."  # how half-written manifests begin
+OURS = (MARKER, HALF)  # how all that begins that crossbody makes in an output folder besides results
 
 
 @dataclass(slots=True)

@@ -9,8 +9,7 @@ from tsdownsample import MinMaxLTTBDownsampler
 from crossbody.cases.arrays import Floats
 
 POINTS = 1500
-BEFORE, AROUND = 5, 12
-"""Samples that stay before an event, and in all."""
+BEFORE, AROUND = 5, 12  # samples that stay before an event, and in all
 
 
 def keep(t: Floats, y: Floats, events: Floats, points: int = POINTS) -> NDArray[np.intp]:

@@ -26,16 +26,13 @@ from typing import TYPE_CHECKING, TextIO
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
 
-GRACE = 0.6
-"""Time that an interrupted command has to put its things in order, s."""
+GRACE = 0.6  # time that an interrupted command has to put its things in order, s
 LIMIT = 3660.0
 """Time that one engine may take for one scene, s: what the reference allows itself, and a minute."""
 TICK = 0.2
-SOON = 0.01
-"""Time after which an interrupt that was swallowed is raised again, s."""
+SOON = 0.01  # time after which an interrupt that was swallowed is raised again, s
 _ROOM = 1 << 16
-ENDED = (0, 1, 2)
-"""Exit codes of a command that had come to its end before the interrupt reached it."""
+ENDED = (0, 1, 2)  # exit codes of a command that had come to its end before the interrupt reached it
 _PARENT_DEATH = 1  # PR_SET_PDEATHSIG
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.reports.scenes import Parameters, Stage, circle, path
 
-SIZE = 0.12
-"""Radius over the height of the fall: the ball of the case is a point."""
+SIZE = 0.12  # radius over the height of the fall: the ball of the case is a point
 
 
 def _radius(p: Parameters) -> float:

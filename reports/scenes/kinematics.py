@@ -10,8 +10,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import WIDTHS, Joint, Scene
 
-Pose = tuple[Floats, Floats]
-"""Origins (n, 3), m, and rotations (n, 3, 3) of one body."""
+Pose = tuple[Floats, Floats]  # origins (n, 3), m, and rotations (n, 3, 3) of one body
 
 
 def body_poses(scene: Scene, q: Floats) -> Mapping[str, Pose]:

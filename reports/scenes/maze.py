@@ -8,8 +8,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.mechanisms.maze.geometry import Maze, Ring, maze_of
 from crossbody.reports.scenes import Parameters, Shape, Stage, circle, path
 
-ARC = 0.06
-"""Angle between two points of a drawn arc, rad."""
+ARC = 0.06  # angle between two points of a drawn arc, rad
 _FACES, _TIPS, _SLIPS = {0: 1.0, 3: -1.0}, (1, 2, 4, 5), (6, 7)
 
 

@@ -19,14 +19,11 @@ from crossbody.engines.nearest import Places, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
 from crossbody.reports.scenes.kinematics import Pose, body_poses, placed
 
-MOST = 500
-"""Bodies that are drawn."""
+MOST = 500  # bodies that are drawn
 SHORT = 1e-5
 """Over so long a time velocities are taken from places, s: its square and rounding over it are both small."""
-AROUND = 24
-"""Points of a drawn circle."""
-FLAT = 5
-"""Decimals to which planes are the same side of a hull."""
+AROUND = 24  # points of a drawn circle
+FLAT = 5  # decimals to which planes are the same side of a hull
 SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 """Corners of each side of a box, seen from outside against the clock."""

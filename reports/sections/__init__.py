@@ -23,8 +23,7 @@ from crossbody.cases.registry import Registry
 from crossbody.reports.figures.section import Section
 from crossbody.reports.sections._own import STUDIES, Study
 
-OWN = tuple(STUDIES)
-"""Names that no plug-in can take."""
+OWN = tuple(STUDIES)  # names that no plug-in can take
 _REGISTRY = Registry("study", __name__)
 
 

@@ -14,8 +14,7 @@ from crossbody.reports.sections import _words as words
 if TYPE_CHECKING:
     import pandas as pd
 
-ANALYSIS = "analysis-"
-"""How the tables of an analysis begin."""
+ANALYSIS = "analysis-"  # how the tables of an analysis begin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

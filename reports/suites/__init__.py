@@ -18,8 +18,7 @@ from crossbody.reports.suites.contract import Suite
 if TYPE_CHECKING:
     from crossbody.cases import Value
 
-OWN = tuple(SUITES)
-"""Names that no plug-in can take."""
+OWN = tuple(SUITES)  # names that no plug-in can take
 _REGISTRY = Registry("suite", __name__, hidden=("axis", "contract"))
 
 

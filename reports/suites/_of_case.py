@@ -15,10 +15,8 @@ from crossbody.reports.suites.axis import Axis, Levels, Linear, Log
 from crossbody.reports.suites.contract import Family, Suite
 
 LAW: Mapping[str, Axis] = {"a0": Log(1e2, 1e6), "a1": Log(1.0, 1e3)}
-SHORT = 0.5
-"""Horizon of a file's runs, s."""
-SPREAD = 2.0
-"""Times and part of its default that a number without bounds is drawn between."""
+SHORT = 0.5  # horizon of a file's runs, s
+SPREAD = 2.0  # times and part of its default that a number without bounds is drawn between
 VARIANTS = 4
 
 

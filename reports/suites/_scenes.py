@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 GRAVITY = 9.81
-RADIUS, LENGTH = 0.025, 0.25
-"""Of the pendulums that pass each other, m."""
+RADIUS, LENGTH = 0.025, 0.25  # of the pendulums that pass each other, m
 
 
 def numbers(drawn: Drawn, *names: str) -> list[float]:

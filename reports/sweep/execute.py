@@ -21,8 +21,7 @@ from crossbody.reports.sweep.bounds import Overdue, bounded, killed, overheard
 from crossbody.reports.sweep.measure import SECOND_RTOL, Asked, Error, error, instants, residual
 from crossbody.reports.sweep.spec import Spec
 
-RTOL = 1e-9
-"""Of the reference, if nothing is said."""
+RTOL = 1e-9  # of the reference, if nothing is said
 ACCOUNT = 10.0
 """The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
 AFFORD = 1_000

@@ -12,8 +12,7 @@ from crossbody.cases import Outcome
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.execute import REFUSED, SKIPPED
 
-STABILITY = "stiffness"
-"""The suite whose grid is the map."""
+STABILITY = "stiffness"  # the suite whose grid is the map
 KNOBS = ("rtol", "dt")
 MAP = ("engine", "profile", "knob", "setting", "a0", "runs", "finished", "worst_error", "worst_residual", "outcomes")
 

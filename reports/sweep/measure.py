@@ -22,8 +22,7 @@ STEPS = 100
 """Fewest steps that a run counts for where its errors are added up: independent ones grow with the root of that."""
 TRACE = 1e-3
 """A touch or release whose shift leaves less than this part of it in the motion is one that pressed nothing."""
-SECOND_RTOL = 1e-12
-"""Tolerance of the independent integrator: grazing multiplies its errors by 1e5."""
+SECOND_RTOL = 1e-12  # tolerance of the independent integrator: grazing multiplies its errors by 1e5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

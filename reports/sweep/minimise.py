@@ -19,8 +19,7 @@ from crossbody.reports.sweep.spec import Spec
 
 TRIES, FEWEST, STEPS = 60, 6, 300_000
 """Runs that one failure may cost: fewer, to a least number, where they take more steps than this together."""
-HALVES = 6
-"""How often a parameter that matters is moved half of what is left towards its default."""
+HALVES = 6  # how often a parameter that matters is moved half of what is left towards its default
 KINDS = ("suite", "case", "variant", "engine", "profile", "outcome", "verdict")
 COLUMNS = (*KINDS, "count", "why", "parameters", "tries", "command")
 Fails = Callable[[Mapping[str, Value]], bool]

@@ -18,8 +18,7 @@ Rows = list[dict[str, Any]]
 Chunk = tuple[int, Sequence[Spec]]
 Task = TypeVar("Task")
 Done = TypeVar("Done")
-ANSWER = 4.0
-"""Time that a scheduler has to answer, s."""
+ANSWER = 4.0  # time that a scheduler has to answer, s
 ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
 
 

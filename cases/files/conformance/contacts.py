@@ -26,8 +26,7 @@ SOFT = "solref is a time constant and a damping ratio, or with numbers below 0 a
 MIXED_SOFT = "Softness of two shapes is a mean by solmix, or the lesser numbers where either says a stiffness."
 SAFE = "A time constant is at least two time steps unless the flag refsafe is off."
 DIRECT = "Say it in the engine: what stands in solref, solimp and solmix is MuJoCo's own."
-STIFF_BY = 0.95
-"""The largest impedance that solimp has where it is not given."""
+STIFF_BY = 0.95  # the largest impedance that solimp has where it is not given
 SHAPES = {
     "floor": Shape(name="floor", type="plane", size=(1.0, 1.0, 0.1)),
     "a": Shape(name="a", body="upper", size=(0.1, 0.0, 0.0), position=(0.0, 0.0, -0.1)),

@@ -63,8 +63,7 @@ _OTHER_LAW = (("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT), 
 _SMALL = "the kinetic energy it is measured by is a thousandth of the energy that is stored"
 _FIXED = "Runge-Kutta 4 at fixed steps of 1 ms, with no event to locate"
 _THOUSANDFOLD = 1e-6
-_EXACT_THERE = ("energy_integrator", "final_lam")
-"""Numbers of a run that fixed steps leave as they are."""
+_EXACT_THERE = ("energy_integrator", "final_lam")  # numbers of a run that fixed steps leave as they are
 _LOCATED = "Runge-Kutta 4 with located events, twenty steps in half a period of the law, from impact to impact"
 _FIXED_STEP = {"position": 1e-6, "energy_drift": 2e-5, "lam_impulse": 1e-6, "lam_impulse_path": 1e-6}
 

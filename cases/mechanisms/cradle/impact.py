@@ -20,14 +20,11 @@ from scipy.optimize import nnls
 from crossbody.cases.arrays import Floats
 
 Touching = NDArray[np.bool_]
-Impulses = dict[int, float]
-"""Row -> impulse, N s, of all rows that act at once."""
+Impulses = dict[int, float]  # row -> impulse, N s, of all rows that act at once
 Impact = Callable[[Floats, Floats, Touching, float, float], Iterator[Impulses]]
 
-TIE = 1e-12
-"""Rates are equal within this part of the fastest ball."""
-STILL = 1e-9
-"""A gap whose rate is below this part of the fastest one seen so far stands still."""
+TIE = 1e-12  # rates are equal within this part of the fastest ball
+STILL = 1e-9  # a gap whose rate is below this part of the fastest one seen so far stands still
 
 
 def sequential(masses: Floats, v: Floats, touching: Touching, e: float, slow: float) -> Iterator[Impulses]:

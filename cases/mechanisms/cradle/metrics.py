@@ -16,10 +16,8 @@ from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.cases.metric import CaseMetric
 from crossbody.cases.trajectory import Trajectory
 
-SLOW = 1e-6
-"""A gap that closes slower than this part of the speed that came in stands still."""
-SHUT = 1e-3
-"""A gap deeper than this part of speed/sqrt(a0) still pushes, in a run without modes."""
+SLOW = 1e-6  # a gap that closes slower than this part of the speed that came in stands still
+SHUT = 1e-3  # a gap deeper than this part of speed/sqrt(a0) still pushes, in a run without modes
 
 
 def row(case: Case) -> scene.Row:

@@ -22,8 +22,7 @@ from crossbody.cases.mechanisms.cradle import chains
 from crossbody.cases.mechanisms.cradle.motion import Motion
 from crossbody.cases.mechanisms.cradle.scene import Row
 
-LARGEST = 20
-"""Balls up to which chains are integrated directly."""
+LARGEST = 20  # balls up to which chains are integrated directly
 
 
 def sequential(row: Row) -> Floats:

@@ -22,8 +22,7 @@ from crossbody.cases.parameters import spread
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene, Shape, Tendon, Vector
 
 FROZEN = ("sequential", "simultaneous")
-SLOWER = 1e-4
-"""a0 of CONTACT over a0 of COLLISION under the frozen rules."""
+SLOWER = 1e-4  # a0 of CONTACT over a0 of COLLISION under the frozen rules
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

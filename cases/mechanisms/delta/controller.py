@@ -24,8 +24,7 @@ from crossbody.cases.mechanisms.soft.form import smooth
 
 NEWTON, CLOSED = 20, 1e-12
 """Steps at most, and the gap of the loops, m, at which the unmeasured angles count as found."""
-SINGULAR = 1e10
-"""Condition of h_x beyond which there is no control Jacobian."""
+SINGULAR = 1e10  # condition of h_x beyond which there is no control Jacobian
 MOTORS = np.arange(0, 9, 3)
 OTHERS = np.delete(np.arange(9), MOTORS)
 NONE = np.full(3, np.nan)

@@ -27,8 +27,7 @@ from crossbody.cases.mechanisms.soft.form import smooth
 from crossbody.cases.parameters import of_numbers
 from crossbody.cases.scene import Actuator, Body, Joint, Loop, Push, Scene
 
-THIN = 2e-15
-"""Inertia of a rod about itself, kg m^2: MuJoCo has no less."""
+THIN = 2e-15  # inertia of a rod about itself, kg m^2: MuJoCo has no less
 ARMS = (1, 2, 3)
 ROBOT = ("d1", "d2", "d3", "l1", "l2", "offset", "upper", "lower", "kp", "kd", "stop", "ahead")
 D1, D2, D3, L1, L2, OFFSET, UPPER, LOWER, KP, KD, STOP, AHEAD = range(len(ROBOT))

@@ -86,8 +86,7 @@ def creep(mu: float, slope: float, press: float, soft: Soft, *, elliptic: bool) 
 
 STICTION, HOLDS, SIGMA = 1e-3, 1e-6, 1e-3
 """Drake's stiction tolerance, m/s, and that of its profile matched; SAP's relative regularisation of friction."""
-CFM, STEP = 1e-5, 1e-3
-"""DART's constraint force mixing, and the step of both engines, s."""
+CFM, STEP = 1e-5, 1e-3  # DART's constraint force mixing, and the step of both engines, s
 
 
 def regularised(rho: float) -> dict[tuple[str, str], float]:

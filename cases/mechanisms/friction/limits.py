@@ -12,8 +12,7 @@ from crossbody.cases.mechanisms.friction.motions import Motion
 CREEPS = (
     "it creeps as the engine's own parameters say: it has friction as a function of the slip, and a force needs one"
 )
-NEAR = 0.05
-"""Part of a predicted creep by which the measured one may be off."""
+NEAR = 0.05  # part of a predicted creep by which the measured one may be off
 NOTHING: Mapping[tuple[str, str], float] = MappingProxyType({})
 HELD = "friction holds: what is left of a slip decays as a gap does"
 

@@ -21,10 +21,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.pieces import pieces
 from crossbody.cases.trajectory import Event, Mode, Trajectory
 
-HALVINGS, LEAST = 100, 1e-300
-"""Of ln u between its least value and its start."""
-Rows = tuple[Floats, Floats, Floats, Floats]
-"""At instants (n,): q (n, nq), v (n, nv), gap and lam (n, nc)."""
+HALVINGS, LEAST = 100, 1e-300  # of ln u between its least value and its start
+Rows = tuple[Floats, Floats, Floats, Floats]  # at instants (n,): q (n, nq), v (n, nv), gap and lam (n, nc)
 Path = Callable[[Floats], tuple[Floats, Floats, Floats]]
 """Times since a start (n,) -> place, velocity and acceleration by friction in the plane of a floor (n, 2)."""
 

@@ -13,8 +13,7 @@ from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage, sha
 from crossbody.cases.mechanisms.friction.scene import FINGER, HIGH, LIFTED, LOW, MASS
 from crossbody.cases.trajectory import Mode
 
-BASE = np.flatnonzero(CORNERS[:, 2] < 0.0)
-"""Corners on which a box lies."""
+BASE = np.flatnonzero(CORNERS[:, 2] < 0.0)  # corners on which a box lies
 
 
 def belt(p: Mapping[str, float]) -> Motion:

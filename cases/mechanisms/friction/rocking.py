@@ -20,8 +20,7 @@ from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage
 from crossbody.cases.mechanisms.friction.scene import MASS
 from crossbody.cases.trajectory import Mode
 
-EDGE = (1, 3)
-"""Corners on which it stands."""
+EDGE = (1, 3)  # corners on which it stands
 
 
 class Block(NamedTuple):

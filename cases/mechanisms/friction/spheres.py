@@ -18,12 +18,9 @@ from crossbody.cases.mechanisms.friction.scene import MASS
 from crossbody.cases.rotations import matrices
 from crossbody.cases.trajectory import Mode
 
-TIGHT, TINY = 1e-13, 1e-15
-"""Relative and absolute tolerance of an attitude that is integrated."""
-FARTHEST = 1e4
-"""Angle through which an attitude is integrated at most, rad."""
-REACH = 0.4
-"""Moment of inertia over m r^2."""
+TIGHT, TINY = 1e-13, 1e-15  # relative and absolute tolerance of an attitude that is integrated
+FARTHEST = 1e4  # angle through which an attitude is integrated at most, rad
+REACH = 0.4  # moment of inertia over m r^2
 
 
 def product(a: Floats, b: Floats) -> Floats:

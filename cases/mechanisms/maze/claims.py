@@ -85,5 +85,4 @@ def _solved(p: Mapping[str, Value], maze: Maze) -> Iterator[Claim]:
         )  # fmt: skip
 
 
-ARRIVED = 60.0
-"""From when on the default run is at rest in the centre, s."""
+ARRIVED = 60.0  # from when on the default run is at rest in the centre, s

@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 
-INERTIA = 0.4
-"""J/(m r^2) of a solid ball."""
+INERTIA = 0.4  # J/(m r^2) of a solid ball
 
 
 def effective_mass(mass: float, R: float, maze_inertia: float, rolling: bool) -> float:

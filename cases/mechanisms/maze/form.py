@@ -20,10 +20,8 @@ from crossbody.cases.mechanisms.maze.torque import force
 from crossbody.cases.scene import Actuator, Body, Joint, Scene, Shape
 
 ONLY_CONTINUOUS = "The torque is evaluated at every state here; a sampled controller runs in the reference alone."
-CHORD = math.radians(5.0)
-"""Longest chord of a wall, as an angle at the axis."""
-TURNING = (0.005, 0.0001)
-"""Torsional and rolling friction of a shape, as a file has them that says nothing."""
+CHORD = math.radians(5.0)  # longest chord of a wall, as an angle at the axis
+TURNING = (0.005, 0.0001)  # torsional and rolling friction of a shape, as a file has them that says nothing
 FAR, FAST = (1.0, 1e-3, 1e-3, 1.0), (1.0, 1e-1, 1e-1, 1.0)
 """Sizes of theta, x, y, phi and of their rates, for absolute tolerances: rad, m, rad/s, m/s."""
 

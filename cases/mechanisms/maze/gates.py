@@ -47,10 +47,8 @@ from crossbody.cases.mechanisms.maze.numbers import (
 Modes = NDArray[np.int8]
 EDGE_BELOW, EDGE_ABOVE, INWARD, OUTWARD, STRAYED = range(5)
 GUARDS = 5
-DEAD_BAND = 1e-12
-"""By how much a position must pass an edge before it can come back over it, relative."""
-GIVEN_UP = math.radians(60.0)
-"""Angle from the top beyond which the controller has no way back, rad."""
+DEAD_BAND = 1e-12  # by how much a position must pass an edge before it can come back over it, relative
+GIVEN_UP = math.radians(60.0)  # angle from the top beyond which the controller has no way back, rad
 FREE, CONTACT = 0, 1
 
 

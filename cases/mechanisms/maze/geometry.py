@@ -23,8 +23,7 @@ _DEFAULTS = (
     (56.2e-3, 61.3e-3, 4, 14.0, 0.0),
     (76.3e-3, 81.5e-3, 4, 11.0, 45.0),
 )
-TABLE = len(_DEFAULTS)
-"""Number of rings whose geometry is given by parameters."""
+TABLE = len(_DEFAULTS)  # number of rings whose geometry is given by parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,10 +20,8 @@ from crossbody.cases import closed_forms as cf
 from crossbody.cases.linear_arc import LinearArc
 from crossbody.cases.trajectory import Event, Mode
 
-SPENT = 0.01
-"""Elastic part of lam at which a COLLISION hands over to CONTACT."""
-LEFT, RIGHT = 2, 3
-"""Rows of the lower corners."""
+SPENT = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
+LEFT, RIGHT = 2, 3  # rows of the lower corners
 _RELEASED = {Mode.FREE, Mode.BALLISTIC, Mode.COLLISION_SEPARATION}
 STAGES: tuple[tuple[int, Mode, frozenset[Mode]], ...] = (
     (LEFT, Mode.FREE, frozenset({Mode.COLLISION})),

@@ -9,8 +9,7 @@ from crossbody.cases.case import Claim, Limit, Parameter, Tier, Value
 from crossbody.cases.mechanisms.soft import closed_forms as closed
 
 _PROTOTYPE = "an independent prototype of the same equations, to the digits it printed"
-_DIGITS = {"touch_right": 1e-5, "touch_left": 1e-5}
-"""Last digit that the prototype printed."""
+_DIGITS = {"touch_right": 1e-5, "touch_left": 1e-5}  # last digit that the prototype printed
 _RUNS: dict[tuple[str, float], dict[str, float]] = {
     ("axis", 0.0): {"touch_right": 1.81511, "touch_left": 2.80418, "contact_imbalance": 0.231, "end_imbalance": 4e-3},
     ("axis", 20.0): {"touch_right": 1.81511, "touch_left": 2.80260, "contact_imbalance": 0.210, "end_imbalance": 2e-5},
@@ -66,13 +65,11 @@ OBVIOUS = (
     "squeeze and holds 0.05 N, not 2 N. Nothing is located within its step of 2 ms."
 )
 _ALWAYS = {"axis": ("velocity",), "delta": ("velocity", "energy_drift")}
-STEP = 1.5
-"""Step of Runge-Kutta 4 in the matched model, in time constants of a pad."""
+STEP = 1.5  # step of Runge-Kutta 4 in the matched model, in time constants of a pad
 _STEPPED = f"Runge-Kutta 4 at {STEP} time constants of a pad: "
 
 
-_PEAK = 1.875
-"""Fastest rate of the jaws' path over its mean."""
+_PEAK = 1.875  # fastest rate of the jaws' path over its mean
 
 
 def _fixed_steps(p: Mapping[str, float], moving: float) -> Iterator[tuple[str, float, str]]:

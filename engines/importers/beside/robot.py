@@ -9,8 +9,7 @@ import numpy as np
 from .conventions import CONVENTIONS
 from .solids import boxes, composite, posed
 
-WIDTHS = {"free": 6, "ball": 3}
-"""Velocities of a joint, of others 1."""
+WIDTHS = {"free": 6, "ball": 3}  # velocities of a joint, of others 1
 
 
 UNSAID: dict[str, Any] = {
