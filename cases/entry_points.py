@@ -36,7 +36,8 @@ def checked_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
     @functools.cache
     def checks() -> dict[str, tuple[str, Check | None]]:
         parameters = inspect.signature(function).parameters.values()
-        return {one.name: (_place(function, one), _check_of(function, one)) for one in parameters}
+        place = function.__qualname__.removesuffix(".__init__")
+        return {one.name: (f"{place}.{one.name}", _check_of(function, one)) for one in parameters}
 
     @functools.wraps(function)
     def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -57,10 +58,6 @@ def checked_fields(of: type[_T]) -> type[_T]:
     """Make a dataclass check its fields before anything else, as `checked_arguments` does for a function."""
     of.__init__ = checked_arguments(of.__init__)  # type: ignore[method-assign]
     return of
-
-
-def _place(function: Callable[..., Any], parameter: inspect.Parameter) -> str:
-    return f"{function.__qualname__.removesuffix('.__init__')}.{parameter.name}"
 
 
 def _check_of(function: Callable[..., Any], parameter: inspect.Parameter) -> Check | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -44,15 +43,11 @@ def module(name: str) -> Any:
     """What defines a case: a plug-in or an installed one by its name, a user's own or a robot's file by its path."""
     if name.endswith(ROBOT_FILES):
         return open_file(name)
-    found = from_file("case", Path(name), cases.names()) if name.endswith(".py") else _named(name)
+    found = from_file("case", Path(name), cases.names()) if name.endswith(".py") else cases.REGISTRY.load(name)
     for wanted in ("PARAMETERS", "VARIANTS", "build"):
         if not hasattr(found, wanted):
             raise SceneError(f"Case file {found.__file__} does not define {wanted}.")
     return found
-
-
-def _named(name: str) -> ModuleType:
-    return cases.REGISTRY.load(name)
 
 
 def resolve(

@@ -181,16 +181,12 @@ def _trajectory(
     )  # fmt: skip
 
 
-def _springs(scene: Line) -> Mapping[str, Any]:
-    """Constants of connectors as they come, which know no law."""
-    return {"stiffness": scene.reduced * scene.a0, "damping": scene.reduced * scene.a1}
-
-
 def _audit(case: Case, scene: Line, model: Model) -> Mapping[str, Any]:
     """What was put in, and the law as Exudyn evaluates it."""
     found: dict[str, Any] = {
         "masses": model.masses, "gravity": scene.gravity, "q0": case.q0, "v0": case.v0,
-        "constants": {"a0": scene.a0, "a1": scene.a1, "a2": scene.a2} if model.laws else _springs(scene),
+        "constants": {"a0": scene.a0, "a1": scene.a1, "a2": scene.a2} if model.laws
+        else {"stiffness": scene.reduced * scene.a0, "damping": scene.reduced * scene.a1},  # which know no law
     }  # fmt: skip
 
     def lam(q: Floats, v: Floats) -> Floats:

@@ -55,11 +55,6 @@ class World:
         return along, [self.axis.dot(body.velocity) for body in self.bodies]
 
 
-def _across(scene: Line) -> str | None:
-    """Return the sentence for a line that is not in its plane."""
-    return "pymunk's plane is x, z, and the bodies slide along y too." if scene.axis[1] else None
-
-
 def _solid(shape: Shape, body: Any, e: float) -> Any:
     """Return a circle, or a plane's wide line, without friction: a pair's restitution is the product of both."""
     at, turned = pymunk.Vec2d(*np.array(shape.position)[PLANE]), matrices(np.array(shape.orientation))
@@ -88,7 +83,9 @@ class Pymunk(Engine):
         """Cases that are not of bodies on a line in the plane x, z, and rows that are always on."""
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
-        return why_not("pymunk", case) or no_rigid_contact(case) or _across(line(case))
+        if why := why_not("pymunk", case) or no_rigid_contact(case):
+            return why
+        return "pymunk's plane is x, z, and the bodies slide along y too." if line(case).axis[1] else None
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **given: Any) -> PeerRun:
         """Build the space.

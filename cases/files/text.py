@@ -34,7 +34,9 @@ def _count(path: Path, folder: Path, seen: set[Path]) -> int:
         try:
             for event, part in ElementTree.iterparse(file, ("start", "end")):
                 if part.tag == "replicate":
-                    copies = copies[:-1] if event == "end" else [*copies, copies[-1] * _copies(part)]
+                    count = part.get("count", "1")
+                    times = int(count) if count.isdecimal() else 1
+                    copies = copies[:-1] if event == "end" else [*copies, copies[-1] * times]
                 elif event == "start" and part.tag in BODIES:
                     total += copies[-1]
                 elif event == "start" and part.tag == "include":
@@ -45,11 +47,6 @@ def _count(path: Path, folder: Path, seen: set[Path]) -> int:
         except ElementTree.ParseError:
             return total
     return total
-
-
-def _copies(part: ElementTree.Element) -> int:
-    text = part.get("count", "1")
-    return int(text) if text.isdecimal() else 1
 
 
 def _included(name: str, path: Path, folder: Path, seen: set[Path]) -> int:

@@ -88,7 +88,9 @@ def check_understood(model: Any) -> None:
     """
     for name in dir(model):
         array = getattr(model, name) if name[0] != "_" else None
-        if not isinstance(array, np.ndarray) or name in READ or name in DERIVED or _only_seen(name):
+        if not isinstance(array, np.ndarray) or name in READ or name in DERIVED:
+            continue
+        if name in DRAWN or name in NOT_FELT or name.startswith(UNSEEN) or name.endswith(("_user", "_group")):
             continue
         default = EMPTY.get(name, 0)
         if array.size and np.any(array != default):
@@ -97,10 +99,6 @@ def check_understood(model: Any) -> None:
                 f"The model's {name}[{where}] is {array[where]}, which is not understood; it must be {default}."
             )
     _check_options(model.opt)
-
-
-def _only_seen(name: str) -> bool:
-    return name in DRAWN or name in NOT_FELT or name.startswith(UNSEEN) or name.endswith(("_user", "_group"))
 
 
 HARMLESS = (

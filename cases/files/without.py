@@ -74,7 +74,8 @@ def strip(model: Any, without: str) -> None:
     for word in _words(without):
         kind, _, name = word.partition(":")
         if not name and kind in ALL:
-            _WHOLE.get(kind, _done)(model)
+            if kind in _WHOLE:  # the rest was left out before the model was compiled
+                _WHOLE[kind](model)
         elif name and kind in _ONE:
             _ONE[kind](model, _index(model, kind, name))
         elif kind != "pair":
@@ -86,10 +87,6 @@ def strip(model: Any, without: str) -> None:
 
 def _words(without: str) -> list[str]:
     return [word for part in without.split(",") if (word := part.strip())]
-
-
-def _done(model: Any) -> None:
-    """Leave alone what was left out before the model was compiled."""
 
 
 def _index(model: Any, kind: str, name: str) -> int:

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from crossbody.cases import closed_forms as cf
-from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
 from crossbody.cases.mechanisms.cradle.limits import limits
 from crossbody.cases.mechanisms.cradle.metrics import METRICS, SLIDING
@@ -73,13 +72,6 @@ def horizon(balls: Row, motion: Motion) -> float:
     return 2.0 * motion.last + 4.0 * balls.n * contact + balls.gap / balls.speed
 
 
-def _start(mechanism: str, balls: Row, parameters: Mapping[str, Value]) -> tuple[Floats, Floats]:
-    """(q0, v0), each (n,)."""
-    if mechanism == "sliders":
-        return np.zeros(balls.n), balls.v0
-    return np.where(np.arange(balls.n) < balls.lifted, float(parameters["angle"]), 0.0), np.zeros(balls.n)
-
-
 def _claims(balls: Row, rule: str) -> tuple[Claim, ...]:
     """What the presentation of the law says of the cradle: as many out as in."""
     if rule != "sequential" or balls.e != 1.0 or np.ptp(balls.masses) > 0.0:
@@ -98,7 +90,9 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     t_end = parameters["t_end"]
     if t_end == AUTO:
         t_end = horizon(balls, motion) if sliders else PENDULUMS_S
-    q0, v0 = _start(mechanism, balls, parameters)
+    angle = 0.0 if sliders else float(parameters["angle"])
+    q0 = np.where(np.arange(balls.n) < balls.lifted, angle, 0.0)
+    v0 = balls.v0 if sliders else np.zeros(balls.n)
     made = scene(parameters, mechanism, law(balls, rule))
     claims = _claims(balls, rule)
     return Case(

@@ -92,7 +92,8 @@ class _Robot:
         at, q, self._T = 0, np.array(q), np.eye(self.nv)
         for (_, _, kind, first, _), (joint, _) in zip(self.joints, self._joints, strict=True):
             if kind == "free":
-                stands, here, on = joint.getTransformFromParentBodyNode(), slice(first, first + 6), _parent(joint)
+                stands, here = joint.getTransformFromParentBodyNode(), slice(first, first + 6)
+                on = joint.getChildBodyNode().getParentBodyNode()
                 if on is not None:  # then its velocities are in the axes of that
                     stands = on.getWorldTransform().multiply(stands)
                     self._T[here, here] = np.kron(np.eye(2), np.array(on.getWorldTransform().rotation()).T)
@@ -179,11 +180,6 @@ class _Robot:
                     J = np.array(own.getMoment())
                     told.append((joint, mass, X.translation() + R @ c, R @ J @ R.T))
         return told
-
-
-def _parent(joint: Any) -> Any:
-    """Return the body that a joint hangs on; none of the world."""
-    return joint.getChildBodyNode().getParentBodyNode()
 
 
 def _mover(body: Any) -> str:

@@ -92,7 +92,8 @@ class Locator:
 
     def _crossed(self, modes: Modes) -> list[Sign]:
         now = self.margins()
-        return [s for s in signs(modes, self.watched) if _gone(now[s[0]][s[1]], s)]
+        # A gap of exactly 0 is closed, a multiplier of exactly 0 does not push.
+        return [s for s in signs(modes, self.watched) if (now[s[0]][s[1]] > 0.0) == (s[2] < 0.0)]
 
     def _redo(self, tau: float) -> None:
         self.rewind()
@@ -101,9 +102,3 @@ class Locator:
         if tau > 0.0:
             self.advance()
             mujoco.mj_forward(self.model, self.data)
-
-
-def _gone(value: float, watched: Sign) -> bool:
-    """Whether a watched value lost its sign: a gap of exactly 0 is closed, a multiplier of exactly 0 does not push."""
-    positive = value > 0.0
-    return positive if watched[2] < 0.0 else not positive

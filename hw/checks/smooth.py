@@ -102,7 +102,9 @@ class JumpCheck:
             (self._degrees, found.at[degrees]), (self._radians, found.at[radians]),
             (self._fast, found.fast[(found.fast >= low) & (found.fast < high)]),
         ):  # fmt: skip
-            first.see(_flags(at, len(values)), rows, times)
+            there = np.zeros(len(values), np.bool_)
+            there[at] = True
+            first.see(there, rows, times)
 
     def findings(self) -> list[Finding]:
         """What was found; the log must have been seen to its end."""
@@ -140,12 +142,6 @@ class JumpCheck:
             text = f"{alone} a smooth motion by {size:+.3g} {self._unit}, and it comes back: a spike?"
             found.append(self._spikes.told("spikes", self._channel, text, fault=False))
         return found
-
-
-def _flags(at: NDArray[np.int64], length: int) -> NDArray[np.bool_]:
-    there = np.zeros(length, np.bool_)
-    there[at] = True
-    return there
 
 
 def unwrapped(times: Floats, values: Floats) -> tuple[Floats, NDArray[np.int64]]:

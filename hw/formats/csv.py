@@ -54,12 +54,9 @@ class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether the file is text, of one byte a letter or two."""
-    return bool(head) and not re.search(r"[\x00-\x08\x0e-\x1f\x7f]", _text(head))
-
-
-def _text(head: bytes) -> str:
     wide = wide_encoding(head)
-    return head[: len(head) & ~1].decode(wide, "replace") if wide else head.decode("latin-1")
+    text = head[: len(head) & ~1].decode(wide, "replace") if wide else head.decode("latin-1")
+    return bool(head) and not re.search(r"[\x00-\x08\x0e-\x1f\x7f]", text)
 
 
 def wide_encoding(head: bytes) -> str:
@@ -84,8 +81,8 @@ class CsvReader:
             with path.open("rb") as file:
                 options = msgspec.structs.replace(options, encoding=wide_encoding(file.read(HEAD)) or "utf-8")
         self._path, self._options = path, options
-        self._delimiter = options.delimiter or _delimiter(path, options)
         line = _first_line(path, options)
+        self._delimiter = options.delimiter or max(DELIMITERS, key=line.count)
         width = line.count(self._delimiter) + 1
         if width > MOST_COLUMNS:  # before anything is made for each of them
             raise LogFormatError(path, f"has {width} columns; a log of more than {MOST_COLUMNS} is not read.")
@@ -198,11 +195,6 @@ def _units(path: Path, options: Options, delimiter: str) -> list[str]:
         _leave_out(path, file, options.skip + int(options.header))
         cells = next(csv.reader([file.readline(BLOCK_BYTES)], delimiter=delimiter), [])
     return [cell.strip().strip("[]()") for cell in cells]
-
-
-def _delimiter(path: Path, options: Options) -> str:
-    line = _first_line(path, options)
-    return max(DELIMITERS, key=line.count)
 
 
 def _is_number(text: str) -> bool:

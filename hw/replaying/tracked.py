@@ -69,13 +69,7 @@ def _means(times: Floats, held: Floats, t: Floats) -> Floats:
     """Means (n, nu) from each instant of t to the next of inputs that hold from their own times on."""
     total = np.concatenate([np.zeros((1, held.shape[1])), np.cumsum(held[:-1] * np.diff(times)[:, None], axis=0)])
     ends = np.append(t, 2.0 * t[-1] - t[-2])
-    at = np.column_stack([_integral(times, total[:, i], held[:, i], ends) for i in range(held.shape[1])])
+    k = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, len(times) - 1)
+    at = total[k] + held[k] * (ends - times[k])[:, None]
     means: Floats = np.diff(at, axis=0) / np.diff(ends)[:, None]
     return means
-
-
-def _integral(times: Floats, total: Floats, held: Floats, t: Floats) -> Floats:
-    """The integral of one input up to instants t; before its first and behind its last time it holds."""
-    k = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(times) - 1)
-    integral: Floats = total[k] + held[k] * (t - times[k])
-    return integral

@@ -70,7 +70,10 @@ def windows(
     if not 0.0 <= reach < math.inf or (length == 0.0 and reach > 0.0) or (length > 0.0 and reach == 0.0):
         raise InvalidValue(f"horizon is {reach!r} s; it must be above 0, and restart too.")
     y, yd = model.read(model, log)
-    delays = _delays(log, model) + delay
+    each = np.array([log.channel("coordinates", name).delay for name in model.channels])
+    if model.needs:  # they are made of others: one for all
+        each = np.full(len(model.measured), each[0])
+    delays = each + delay
     driven = any(name in log.names("inputs") for name in model.inputs)
     u = recorded_inputs(log, model) if driven else np.zeros((len(log), 0))
     cuts = _cuts(log.time, length, reach)
@@ -103,12 +106,6 @@ def _in_force(log: Log, name: str) -> Floats:
         return channel.values
     rows = np.searchsorted(log.times("inputs", name), log.time + SAME * log.sample_time, side="right") - 1
     return channel.values[np.maximum(rows, 0)]
-
-
-def _delays(log: Log, model: Model) -> Floats:
-    """Delay of every compared coordinate (k,), s, as the column map says; one for all where they are made of others."""
-    each = np.array([log.channel("coordinates", name).delay for name in model.channels])
-    return np.full(len(model.measured), each[0]) if model.needs else each
 
 
 def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:

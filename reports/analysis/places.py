@@ -116,10 +116,6 @@ def _place(
     )  # fmt: skip
 
 
-def _ball(case: Case, at: Mapping[str, float]) -> list[Place]:
-    return [_place(case, "on the floor", [0], held=False)]
-
-
 def _delta(case: Case, at: Mapping[str, float]) -> list[Place]:
     """Held by constant torques; where its servos end, if they move; its feedback loop, if it has a controller."""
     robot = scene.robot_of(case.parameters)
@@ -273,6 +269,7 @@ def _activations(case: Case, system: System, t: float) -> Floats | None:
 
 
 PLACES: Mapping[str, Callable[[Case, Mapping[str, float]], list[Place]]] = {
-    "ball": _ball, "delta": _delta, "maze": _maze, "soft_contact": _soft, "red_body": _red_body, "sliders": _chain,
+    "ball": lambda case, at: [_place(case, "on the floor", [0], held=False)],
+    "delta": _delta, "maze": _maze, "soft_contact": _soft, "red_body": _red_body, "sliders": _chain,
     "pendulums": _chain,
 }  # fmt: skip

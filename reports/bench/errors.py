@@ -65,7 +65,10 @@ def errors(truth: Truth, run: Trajectory, case: Case) -> dict[str, float]:
     if not run.outcome.ok or touches:
         return dict.fromkeys(("error", *PARTS), math.inf) | {"touches": touches}
     parts = {part: _measured(name, truth, run, case) for part, name in PARTS.items()}
-    return {"error": _larger(parts["error_q"], parts["error_times"] / case.t_end), **parts, "touches": 0.0}
+    # Where nothing touches there are no times, without a position there is no error.
+    apart, times = parts["error_q"], parts["error_times"] / case.t_end
+    error = math.inf if math.isnan(apart) else max(apart, 0.0 if math.isnan(times) else times)
+    return {"error": error, **parts, "touches": 0.0}
 
 
 def between(case: Case, pick: Pick, run: Any, steps: Trajectory, truth: Truth) -> float:
@@ -105,11 +108,6 @@ def _measured(metric: str, truth: Truth, run: Trajectory, case: Case) -> float:
     """The metric's value, NaN where it has none."""
     value = metrics.load(metric).measure(truth, run, case)
     return math.nan if value is None else float(value)
-
-
-def _larger(position: float, times: float) -> float:
-    """The larger of two errors; where nothing touches there are no times, without a position there is no error."""
-    return math.inf if math.isnan(position) else max(position, 0.0 if math.isnan(times) else times)
 
 
 def known_to(case: Case, truth: Truth) -> float:

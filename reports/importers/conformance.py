@@ -66,14 +66,10 @@ def _told(feature: Feature, engine: str, audit: Audit, answer: dict[str, Any]) -
         return str(answer["why"])
     with Forms(audit.path, lambda form: opened(form, job=audit.job)) as forms:
         found = excused(rows(engine, answer, audit.wanted, audit.job["joints"]), answer, audit, forms)
-    about = [row for row in found if row.quantity in ("reading", "coordinates", *feature.about) and not _follows(row)]
+    about = [row for row in found if row.quantity in ("reading", "coordinates", *feature.about)]
+    about = [row for row in about if (row.quantity, row.verdict) != ("energy", UNSEEN)]  # it follows from the others
     worst = min(about, key=lambda row: WORST.index(row.verdict))
     return replace(worst, version=answer.get("version", ""), cause=feature.name)
-
-
-def _follows(row: Row) -> bool:
-    """Return whether a quantity that is not shown follows from the others."""
-    return (row.quantity, row.verdict) == ("energy", UNSEEN)
 
 
 def table(

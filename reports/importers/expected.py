@@ -165,11 +165,10 @@ def _numbers(scene: Scene) -> dict[str, dict[str, list[float]]]:
         "lower": lambda j: j.range[0] if single(j) else -np.inf, "upper": lambda j: j.range[1],
         "least force": lambda j: j.force_range[0], "most force": lambda j: j.force_range[1],
     }  # fmt: skip
-    return {key: {joint.name: _listed(value(joint)) for joint in scene.joints} for key, value in of.items()}
-
-
-def _listed(value: Any) -> list[float]:
-    return [float(x) for x in np.atleast_1d(value)]
+    return {
+        key: {joint.name: [float(x) for x in np.atleast_1d(value(joint))] for joint in scene.joints}
+        for key, value in of.items()
+    }
 
 
 def moved_by(scene: Scene) -> dict[str, str]:

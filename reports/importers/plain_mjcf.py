@@ -6,7 +6,7 @@ inertias given, <frame>s and poses of bodies that are fixed to the world put int
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -200,14 +200,9 @@ def mjcf(path: Path, out: Path) -> Node:
     return root
 
 
-def _bodies(root: Node) -> Iterator[Node]:
-    for world in root.findall("worldbody"):
-        yield from world.iter("body")
-
-
 def _say_bodies(root: Node, model: Any) -> None:
     """Write the inertias and joints as they were compiled: both count their bodies in the order of the file."""
-    bodies = list(_bodies(root))
+    bodies = [body for world in root.findall("worldbody") for body in world.iter("body")]
     joints = [joint for body in bodies for joint in body if joint.tag in ("joint", "freejoint")]
     if len(bodies) != model.nbody - 1 or len(joints) != model.njnt:
         raise SceneError("The file cannot be rewritten: its compiled model has other bodies (fusestatic?).")

@@ -402,14 +402,9 @@ def _row(
         return replace(found, where=place(truth, run, judge_.case)) if place and beyond else found
     if name in judge_.claims:
         return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
-    if wanted and _shown(metric, truth, judge_.case):
+    if wanted and metric.measure(truth, truth.trajectory, judge_.case) is not None:
         return judge_.missing(name, metric.UNIT, "The run lacks this number, which the truth has.", needs)
     return None
-
-
-def _shown(metric: metrics.Metric, truth: Truth, case: Case) -> bool:
-    """Whether the truth itself has that number."""
-    return metric.measure(truth, truth.trajectory, case) is not None
 
 
 def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, case: Case) -> tuple[float | None, float]:

@@ -7,7 +7,7 @@ some units, where they are over before the next begins.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -130,12 +130,9 @@ def _run(line: Line, case: Case) -> tuple[Case, Trajectory, str]:
         if not run.outcome.ok or over(run):
             break
         case = replace(case, t_end=2.0 * case.t_end)
-    return case, run, _followed(prepared.settings, case)
-
-
-def _followed(settings: Mapping[str, Any], case: Case) -> str:
-    """The machine of an engine's own, impacts where a restitution stands for the law, else the case's machine."""
-    return "impacts" if "restitution" in settings else str(settings.get("law", case.fsm))
+    # An engine's own machine, impacts where a restitution stands for the law, else the case's machine.
+    followed = "impacts" if "restitution" in prepared.settings else str(prepared.settings.get("law", case.fsm))
+    return case, run, followed
 
 
 def over(run: Trajectory) -> bool:
@@ -158,14 +155,8 @@ def _measured(case: Case, run: Trajectory) -> dict[str, Any]:
         "energy_created": float(run.total_energy[-1]) / brought - 1.0,
         "energy_switching": math.nan if jumps is None else jumps / brought,
         "momentum": float(run.v[-1] @ balls.masses) / momentum - 1.0,
-        "nearest": _nearest(known),
+        "nearest": next(name[len("to_") :] for name, off in known.items() if off <= min(known.values()) + TIE),
     }  # fmt: skip
-
-
-def _nearest(apart: Mapping[str, float]) -> str:
-    """The rule that is followed most closely; of those equally close the first."""
-    least = min(apart.values())
-    return next(name.removeprefix("to_") for name, value in apart.items() if value <= least + TIE)
 
 
 def summary(rows: pd.DataFrame, ideal: float = 1e-3) -> pd.DataFrame:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.impulse import away
 from crossbody.reports.measuring.scale import least, of_like
@@ -26,15 +25,10 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     collisions that take no time are left out: several may share one, and a sample does not say behind which it stands.
     """
     inside, exact = aligned(truth, run)
-    scale = _scale(truth.trajectory, case)
     if not inside.any():
         return None
+    shared = of_like(np.max(np.abs(truth.trajectory.v), axis=0), case.velocities)
+    scale = np.maximum(shared, least(case.velocities, rates=True))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     off = np.abs(run.v[inside] - exact.v)[smooth] / scale
     return float(np.max(off, initial=0.0))
-
-
-def _scale(exact: Trajectory, case: Case) -> Floats:
-    """Largest |v_truth| of all that share a unit (nv,), and no less than what such rates are measured by."""
-    shared = of_like(np.max(np.abs(exact.v), axis=0), case.velocities)
-    return np.maximum(shared, least(case.velocities, rates=True))

@@ -52,7 +52,8 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     """
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
-        name=case.page, title=case.label, lead=_lead(case.about), engines=_engines(traces),
+        name=case.page, title=case.label, lead=_lead(case.about),
+        engines=[{"name": label(trace), **style(trace, i)} for i, trace in enumerate(traces)],
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
             *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
@@ -68,10 +69,6 @@ def _lead(about: Mapping[str, Any]) -> str:
     truth = f" Truth: {about['tier']} ({about['source']})." if about.get("tier") else ""
     title = about["title"].rstrip(".")
     return f"{title[:1].upper()}{title[1:]}.{truth}"
-
-
-def _engines(traces: Sequence[Trace]) -> list[Mapping[str, Any]]:
-    return [{"name": label(trace), **style(trace, i)} for i, trace in enumerate(traces)]
 
 
 def _walls(found: Results, case: CaseFiles) -> dict[str, float]:

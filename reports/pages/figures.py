@@ -69,16 +69,13 @@ def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
     return difference
 
 
-def _floors(traces: Sequence[Trace], units: Sequence[str]) -> dict[str, float]:
-    """One floor a unit: a coordinate that stays at 0 is compared with its neighbours' size."""
-    q = traces[0].run.q
-    return {unit: floor_of(q[:, [k for k, u in enumerate(units) if u == unit]]) for unit in units}
-
-
 def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Every coordinate of every engine, and under it log |difference to the truth|, impacts matched."""
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
-    floors = _floors(traces, [unit for _, unit in names])
+    # One floor a unit: a coordinate that stays at 0 is compared with its neighbours' size.
+    floors = {
+        unit: floor_of(traces[0].run.q[:, [k for k, (_, u) in enumerate(names) if u == unit]]) for _, unit in names
+    }
     shown = drawn(len(names))
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
     sheet = Sheet(rows, "Coordinates, and |difference from the truth|, impacts matched", points, group=2)

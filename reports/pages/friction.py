@@ -16,6 +16,8 @@ from crossbody.reports.figures.values import coded, plain
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.scenes.scene import slip
 
+LINE = {"color": LEVEL, "dash": "dash", "width": 1}
+DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
 MOST = 1000  # points of one engine's line
 TEXT = (
     "For the contact with the largest load. The force of a sticking contact is inside the cone, that of a sliding one "
@@ -41,7 +43,7 @@ def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
         _plot("cone", f"Friction over normal force, {name}", [one for one, _ in lines],
               ("lam [N]", "|friction| [N]"), [_edge(contact.friction, top)]),
         _plot("plane", f"Friction over mu lam in the plane, {name}", [one for _, one in lines],
-              ("friction t1 / (mu lam) [1]", "friction t2 / (mu lam) [1]"), [_disc()], square=True),
+              ("friction t1 / (mu lam) [1]", "friction t2 / (mu lam) [1]"), [DISC], square=True),
     ]  # fmt: skip
     if contact.first.type == "plane":
         slips = [_line(trace, i, _slipping(trace, contact, place), most) for i, trace in enumerate(traces)]
@@ -113,10 +115,4 @@ def _plot(
 
 def _edge(mu: float, top: float) -> dict[str, Any]:
     text = {"text": f"mu lam, mu = {mu:g}", "font": {"size": 10, "color": LEVEL}}
-    line = {"color": LEVEL, "dash": "dash", "width": 1}
-    return {"type": "line", "x0": 0.0, "y0": 0.0, "x1": top, "y1": mu * top, "line": line, "label": text}
-
-
-def _disc() -> dict[str, Any]:
-    return {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0,
-            "line": {"color": LEVEL, "dash": "dash", "width": 1}}  # fmt: skip
+    return {"type": "line", "x0": 0.0, "y0": 0.0, "x1": top, "y1": mu * top, "line": LINE, "label": text}

@@ -102,7 +102,8 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
     scripts = [THEME, *((_script(), _text(PLOTLY)) if single else ())]
     template = environment().get_template("page.html")
     return template.render(
-        pages=pages, links=links, footer=footer, href=href, drawn=any(_drawn(page) for page in pages),
+        pages=pages, links=links, footer=footer, href=href,
+        drawn=any(section.plots for page in pages for section in page.sections),
         inline={key: Markup(text) for key, text in inline.items()}, theme=Markup(THEME), policy=policy(scripts, single),
     )  # fmt: skip
 
@@ -134,10 +135,6 @@ def assets(pages_drawn: bool) -> dict[str, str]:
     """The files that all pages of a folder share, by name."""
     shared = {SCRIPT: _script(), STYLE: _text("page.css")}
     return shared | ({PLOTLY: _text(PLOTLY)} if pages_drawn else {})
-
-
-def _drawn(page: Page) -> bool:
-    return any(section.plots for section in page.sections)
 
 
 @cache

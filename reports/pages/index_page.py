@@ -36,15 +36,10 @@ def index_pages(found: Results) -> list[Page]:
     return [
         Page(
             name=name, title="crossbody" if i == 0 else f"crossbody, cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
-            lead=_lead(found),
+            lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip
-
-
-def _lead(found: Results) -> str:
-    """Who is within and who is off."""
-    return sentence(runs_of(found.verdicts)) if found.verdicts else ""
 
 
 def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> list[Section]:

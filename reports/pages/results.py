@@ -150,7 +150,8 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
         abouts.setdefault(label, about)
         times[label, who] = told["wall_s"], about.get("took_s")
     labels = dict.fromkeys([*(row["label"] for row in verdicts), *paths])
-    wanted = _wanted(verdicts)
+    ran = _by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
+    wanted = {label: list(dict.fromkeys(row["who"] for row in rows)) for label, rows in ran.items()}
     found = tuple(
         CaseFiles(
             label=label, page=f"case-{file_name(label)}", about=abouts.get(label, {}),
@@ -164,12 +165,6 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
 def times_of(out: Path) -> Times:
     """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile."""
     return _cases(out, verdicts_of(out))[1]
-
-
-def _wanted(verdicts: Sequence[Row]) -> dict[str, list[str]]:
-    """Engines whose motion should be there, by case."""
-    ran = _by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
-    return {label: list(dict.fromkeys(row["who"] for row in rows)) for label, rows in ran.items()}
 
 
 def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:

@@ -39,11 +39,6 @@ def is_table(name: str) -> bool:
     return _TABLE.fullmatch(name) is not None
 
 
-def _is_given(name: str) -> bool:
-    """Whether only crossbody gives this name."""
-    return is_base(name) or _MOTION.fullmatch(name) is not None or name in ASSETS or name == "index.html"
-
-
 def is_base(name: str) -> bool:
     """Whether every folder has this file: a study without verdicts writes it only where nobody has."""
     return _BASE.fullmatch(name) is not None
@@ -133,7 +128,8 @@ def _unchanged(folder: Path, sums: Mapping[str, str]) -> Iterator[str]:
     known = {name for name in plain if os.path.lexists(folder / name) and _is_generated(folder, name)}
     for name, told in sums.items():
         try:
-            if _is_given(name) or name in known or files.digest(folder, name) == told:
+            own = is_base(name) or _MOTION.fullmatch(name) is not None or name in ASSETS or name == "index.html"
+            if own or name in known or files.digest(folder, name) == told:
                 yield name
         except FileNotFoundError:
             yield name

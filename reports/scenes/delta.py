@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.reports.scenes import Parameters, Shape, Stage, path
+from crossbody.reports.scenes import Parameters, Stage, path
 
 # Points: hinge, elbow, wrist of each arm, one arm after another; then the flange.
 FLANGE = 9
@@ -20,7 +20,9 @@ def turns(p: Parameters) -> Floats:
 def stage(p: Parameters) -> Stage:
     """Links as lines, the wrists joined to a triangle."""
     arms = tuple((3 * i, 3 * i + 1, 3 * i + 2) for i in range(3))
-    return Stage(still=(_rim(p),), lines=(*arms, (2, 5, 8, 2), (2, FLANGE), (5, FLANGE), (8, FLANGE)), down=True)
+    at, r = np.linspace(0.0, 2.0 * np.pi, 37), float(p["r_base"])
+    rim = path(np.stack([r * np.cos(at), r * np.sin(at), 0.0 * at], axis=1))  # of the base, through the hinges
+    return Stage(still=(rim,), lines=(*arms, (2, 5, 8, 2), (2, FLANGE), (5, FLANGE), (8, FLANGE)), down=True)
 
 
 def poses(q: Floats, p: Parameters) -> Floats:
@@ -48,10 +50,3 @@ def _arm(q: Floats, turn: float, p: Parameters) -> Floats:
     rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     points: Floats = np.stack([hinge, elbow, wrist], axis=1) @ rotation.T
     return points
-
-
-def _rim(p: Parameters) -> Shape:
-    """The base through the hinges."""
-    at = np.linspace(0.0, 2.0 * np.pi, 37)
-    r = float(p["r_base"])
-    return path(np.stack([r * np.cos(at), r * np.sin(at), 0.0 * at], axis=1))

@@ -28,7 +28,8 @@ def poses(q: Floats, p: Parameters) -> Floats:
     """Points of the robot, fingers and block."""
     robot = delta.poses(q[:, :9], p)
     flange, block = robot[:, delta.FLANGE], q[:, _BLOCK]
-    pads = np.stack([_moved(flange, q[:, 9 + side]) for side in (0, 1)], axis=1)
+    # The pads' faces keep the flange's height.
+    pads = np.stack([np.stack([q[:, 9 + side], flange[:, 1], flange[:, 2]], axis=1) for side in (0, 1)], axis=1)
     roots = pads + np.array([0.0, 0.0, -0.5 * float(p["width"])])
     return np.concatenate([robot, roots, pads, block[:, None, :] + float(p["width"]) * _CUBE], axis=1)
 
@@ -39,8 +40,3 @@ def arrows(q: Floats, lam: Floats, p: Parameters) -> Floats:
     ways = np.array([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, -1.0)])
     own = [np.concatenate([block - half * way, lam[:, [6 + k]] * way], axis=1) for k, way in enumerate(ways)]
     return np.concatenate([delta.arrows(q[:, :9], lam[:, :6], p), np.stack(own, axis=1)], axis=1)
-
-
-def _moved(flange: Floats, x: Floats) -> Floats:
-    """The pad's face: it keeps the flange's height, and stands at x."""
-    return np.stack([x, flange[:, 1], flange[:, 2]], axis=1)

@@ -56,6 +56,7 @@ def scene(case: Case, maze: Maze) -> Scene:
     """Return bodies and shapes; gravity lies in the plane, the maze turns about its axis and weighs as a disc would."""
     J, mass, r = case.number("maze_inertia"), case.number("ball_mass"), maze.ball
     spin, friction = 0.4 * mass * r * r, float(bool(case.parameters["rolling"]))
+    rings = (*maze.rings, Ring(inner=maze.wall, outer=maze.wall + THICKNESS))  # the wall as thick as an added ring
     return Scene(
         bodies=(
             Body(name="maze", mass=2.0 * J / maze.wall**2, inertia=(0.5 * J, 0.5 * J, J, 0.0, 0.0, 0.0)),
@@ -69,16 +70,11 @@ def scene(case: Case, maze: Maze) -> Scene:
         ),
         shapes=(
             Shape(name="ball", body="ball", size=(r, 0.0, 0.0), friction=(friction, *TURNING)),
-            *(shape for i, ring in enumerate(_walls(maze)) for shape in _chords(i, ring, friction)),
+            *(shape for i, ring in enumerate(rings) for shape in _chords(i, ring, friction)),
         ),
         actuators=(Actuator(name="torque", joint="maze"),),
         gravity=(0.0, -tilted_gravity(case.parameters), 0.0),
     )  # fmt: skip
-
-
-def _walls(maze: Maze) -> tuple[Ring, ...]:
-    """Return the rings and the wall around them, as thick as the thickest ring that is added."""
-    return (*maze.rings, Ring(inner=maze.wall, outer=maze.wall + THICKNESS))
 
 
 def _chords(i: int, ring: Ring, friction: float) -> Iterator[Shape]:

@@ -53,12 +53,8 @@ def _free_world(q: Any, angles_first: Any) -> Any:
     return np.concatenate([angles_first, q[:3]]), J, np.zeros(6)
 
 
-def _plain(q: Any, v: Any) -> Any:
-    return np.asarray(q, dtype=float), np.eye(len(v)), np.zeros(len(v))
-
-
 CONVENTIONS: dict[str, Any] = {
-    "mujoco": _plain,
+    "mujoco": lambda q, v: (np.asarray(q, dtype=float), np.eye(len(v)), np.zeros(len(v))),
     "p, xyzw; body, body": _free_body,
     "wxyz, p; world, world": lambda q, v: _free_world(q, q[3:]),
     "rotation vector, p; world, world": lambda q, v: _free_world(q, rotation_vector(q[3:])),
