@@ -9,8 +9,8 @@ A metric is a module with a docstring whose first line says what it measures, an
 
 and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name; if it can say of
 what the number is, `where(truth, run, case)`, in a few words. What the runs of
-one mechanism alone show is data of its cases (`crossbody.cases.metric`); what any case may claim of a run alone stands
-together in `_of_run`, and what only contacts with friction have in `_of_friction`.
+one mechanism alone show is data of its cases (`crossbody.cases.metric`). Metrics of a kind stand together as functions
+of one module, named by its UNITS and NEEDS; those of a run alone, (run, case), in `_of_run` and `_of_friction`.
 """
 
 from __future__ import annotations
@@ -42,23 +42,24 @@ class Metric(Protocol):
 
 
 _REGISTRY = Registry("metric", __name__)
+_OF_RUNS = ("_of_run", "_of_friction")
 
 
 def names() -> tuple[str, ...]:
     """Names of all metrics; imports none of them."""
-    return tuple(sorted({*_REGISTRY.names(), *_of_runs()}))
+    return tuple(sorted({*_REGISTRY.names(), *_together()}))
 
 
 def summary(name: str) -> str:
     """What a metric measures, in one line; imports nothing."""
-    return _of_runs()[name][1] if name in _of_runs() else _REGISTRY.summary(name)
+    return _together()[name][1] if name in _together() else _REGISTRY.summary(name)
 
 
 @cache
-def _of_runs() -> Mapping[str, tuple[str, str]]:
+def _together() -> Mapping[str, tuple[str, str]]:
     """Return the functions of the modules that hold several, each with its module and what it measures."""
     found: dict[str, tuple[str, str]] = {}
-    for module in ("_of_run", "_of_friction"):
+    for module in (*_OF_RUNS, "_contacts", "_energies", "_motions", "_multipliers"):
         text = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
         for node in ast.parse(text).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
@@ -72,7 +73,7 @@ def load(name: str) -> Metric:
     Raises:
         UnknownName: if there is no such metric; the message lists the names.
     """
-    if isinstance(name, str) and name in _of_runs():
+    if isinstance(name, str) and name in _together():
         return _among_others(name)
     try:
         return cast("Metric", _REGISTRY.load(name))
@@ -83,10 +84,12 @@ def load(name: str) -> Metric:
 @cache
 def _among_others(name: str) -> Metric:
     from crossbody.cases.metric import CaseMetric  # numpy, without which names are listed
-    from crossbody.reports.metrics._of_case import OfCase
+    from crossbody.reports.metrics._of_case import OfCase, OfModule
 
-    module, doc = _of_runs()[name]
+    module, doc = _together()[name]
     own = import_module(f"{__name__}.{module}")
+    if module not in _OF_RUNS:
+        return OfModule(getattr(own, name), UNIT=own.UNITS.get(name, "1"), NEEDS=own.NEEDS.get(name, ""))
     how = {own.KINDS.get(name, "number"): getattr(own, name)}
     metric = CaseMetric(doc=doc, unit=own.UNITS.get(name, "1"), always=own.ALWAYS, **how)
     return OfCase(metric, jumps=own.ALWAYS)

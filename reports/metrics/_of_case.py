@@ -1,7 +1,8 @@
-"""A metric that a case brings along, measured like the others."""
+"""Metrics that are no modules: those that a case brings along, and the functions of a module that holds several."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,9 +10,21 @@ import numpy as np
 from crossbody.reports.measuring.alignment import aligned
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from crossbody.cases import Case, Trajectory
     from crossbody.cases.metric import CaseMetric
     from crossbody.reports.measuring.truth import Truth
+
+
+@dataclass(slots=True)
+class OfModule:
+    """A function (truth, run, case) of a module that holds several metrics."""
+
+    measure: Callable[[Truth, Trajectory, Case], float | None]
+    UNIT: str
+    NEEDS: str
+    CLAIMED: bool = False
 
 
 class OfCase:

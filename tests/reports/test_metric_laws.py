@@ -221,7 +221,7 @@ def test_what_a_run_withholds_is_no_number_of_the_metrics_that_say_they_need_it(
 def test_all_that_is_beside_a_truth_is_measured_of_every_run() -> None:
     """What a run shows alone is where a case asks for it, and so are modes that hold, which take as long as a run."""
     asked = {name for name in metrics.names() if metrics.load(name).CLAIMED}
-    assert asked == {name for name, (module, _) in metrics._of_runs().items() if module == "_of_run"} | {
+    assert asked == {name for name, (module, _) in metrics._together().items() if module == "_of_run"} | {
         "violated_modes"
     }
 

@@ -1,0 +1,169 @@
+"""Touches, releases, modes and gaps of a run, against the truth's and itself: every function is a metric."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from crossbody.cases import Case, Trajectory
+from crossbody.cases.contacts import Contact, contacts, rates
+from crossbody.reports.measuring.alignment import aligned, matched
+from crossbody.reports.measuring.equations import equations, finite, spread
+from crossbody.reports.measuring.impulse import away
+from crossbody.reports.measuring.truth import Truth
+
+UNITS = {"constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m"}
+NEEDS: dict[str, str] = {}
+ROUNDING = 1e-6
+"""Part of the largest coordinate: gaps that never open beyond it are known to its tolerance alone, and on those below
+it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
+SHALLOW = 1e-12
+"""Penetration below this part of the largest gap is rounding: collisions that take no time do not penetrate."""
+
+
+def constraint_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Largest gap of the rows that are always on: zero where a closure holds.
+
+    Max |h| over all bilateral rows and samples, m; None without such a row. Where a case starts off the
+    manifold this is its start; its decay is what the law prescribes.
+    """
+    rows = ~case.law.unilateral
+    return float(np.max(np.abs(run.gap[:, rows]))) if rows.any() else None
+
+
+def event_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Instants of touch and release against the truth's, matched in order.
+
+    Max |t - t_truth| over matched touches and releases, s; None where nothing touches. A contact that the
+    run or the truth does not have is not here: it is a difference in the metric contacts. NaN where an event
+    of the run has no instant.
+    """
+    if np.isnan([event.t for event in run.events]).any():
+        return math.nan
+    pairs = matched(truth, run)
+    shifts = [abs(b.touch - a.touch) for a, b in pairs]
+    shifts += [abs(b.release - a.release) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+    return max(shifts, default=None)
+
+
+def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Gaps against the truth's on matched arcs, over the largest.
+
+    Max |gap - gap_truth| / max |gap_truth| over samples and unilateral rows; None without such a row. Where
+    a discrete variable changes a gap may jump: those instants are left out.
+    """
+    rows = case.law.unilateral
+    inside, exact = aligned(truth, run)
+    if not rows.any() or not inside.any():
+        return None
+    smooth = away(exact, [switch.t for switch in truth.trajectory.switches if not switch.smooth], case.t_end)
+    off = float(np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], initial=0.0))
+    scale = float(np.max(np.abs(truth.trajectory.gap[:, rows])))
+    scale = max(scale, ROUNDING * float(np.max(np.abs(truth.trajectory.q), initial=0.0)))
+    return off / scale if scale else off
+
+
+def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Recorded gaps against those of the recorded positions, over the largest: an identity at every sample.
+
+    Max |gap - gap(q)| / max |gap(q)|, at most 400 samples. None without rows, where gaps depend on discrete
+    variables, and where the case has no equations.
+    """
+    system = equations(case)
+    if system is None or not run.gap.shape[1] or system.jumps:
+        return None
+    if not finite(run):
+        return math.nan
+    some = spread(run)
+    wanted = np.array([system.gap(q)[0] for q in run.q[some]])
+    scale = max(float(np.max(np.abs(wanted))), ROUNDING * float(np.max(np.abs(run.q[some]))))
+    off = float(np.max(np.abs(run.gap[some] - wanted)))
+    return off / scale if scale else off
+
+
+def mode_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Instants of hand-over and of freedom against the truth's, contacts matched in order.
+
+    Max |t - t_truth| over all that matched contacts have in both, s; None where there is none. A hand-over
+    is from COLLISION to CONTACT; a row is free at its release or, let go below the surface, where it comes
+    up to it. NaN where an event of the run has no instant.
+    """
+    if np.isnan([event.t for event in run.events]).any():
+        return math.nan
+    pairs = matched(truth, run)
+    shifts = [abs(b.settled - a.settled) for a, b in pairs if np.isfinite(a.settled) and np.isfinite(b.settled)]
+    shifts += [_opened(truth.trajectory, a, b) for a, b in pairs if np.isfinite(a.free) and np.isfinite(b.free)]
+    return max(shifts, default=None)
+
+
+def _opened(truth: Trajectory, a: Contact, b: Contact) -> float:
+    """How far the gap of the truth opens from one freedom to the other, over its fastest rate, s.
+
+    A row that is let go where its multiplier vanishes rises as the cube of the time: its instant is known to the cube
+    root of its depth alone, and nothing in the motion depends on it. Where a discrete variable changes in between, the
+    row's gap is another one: that instant is judged as a change of the variable.
+    """
+    first, last = sorted((a.free, b.free))
+    if any(first <= switch.t <= last and not switch.smooth for switch in truth.switches):
+        return 0.0
+    gap, (here, there) = truth.gap[:, a.row], np.interp([a.free, b.free], truth.t, truth.gap[:, a.row])
+    dt = np.diff(truth.t)
+    fastest = float(np.max(np.abs(np.diff(gap)[dt > 0.0] / dt[dt > 0.0]), initial=0.0))
+    return abs(there - here) / fastest if fastest else 0.0
+
+
+def penetration(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Largest penetration.
+
+    max(0, -gap) over all unilateral rows and samples, m.
+    """
+    rows = case.law.unilateral
+    return float(np.max(-run.gap[:, rows], initial=0.0)) if rows.any() else None
+
+
+def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Penetration against the truth's on matched arcs, over the largest penetration.
+
+    Max |min(gap, 0) - min(gap_truth, 0)| / max penetration of the truth; None where nothing penetrates.
+    """
+    rows = case.law.unilateral
+    deepest = float(np.max(-truth.trajectory.gap[:, rows], initial=0.0))
+    if deepest <= SHALLOW * float(np.max(np.abs(truth.trajectory.gap), initial=0.0)):
+        return None
+    inside, exact = aligned(truth, run)
+    if not inside.any():
+        return None
+    return (
+        float(np.max(np.abs(np.minimum(run.gap[inside][:, rows], 0.0) - np.minimum(exact.gap[:, rows], 0.0)))) / deepest
+    )
+
+
+def release_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Contacts that ended in the run less those of the truth: 0 if both let go equally often.
+
+    Number of contacts of the run that ended minus the truth's; None without a row that can open.
+    """
+    if not case.law.unilateral.any():
+        return None
+    mine, theirs = (
+        sum(np.isfinite(c.release) for c in contacts(each, truth.joined)) for each in (run, truth.trajectory)
+    )
+    return float(mine - theirs)
+
+
+def restitution_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Restitution against the truth's, largest difference over matched contacts.
+
+    Max |e - e_truth| over the contacts that ended in both; None where there is none.
+    """
+    pairs = zip(rates(truth.trajectory), rates(run), strict=False)
+    return max((abs(out / into - b_out / b_into) for (_, b_into, b_out), (_, into, out) in pairs), default=None)
+
+
+def touch_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Contacts of the run less those of the truth: 0 if both touch equally often.
+
+    Number of contacts of the run minus the truth's.
+    """
+    return float(len(contacts(run, truth.joined)) - len(contacts(truth.trajectory, truth.joined)))

@@ -1,0 +1,107 @@
+"""Multipliers of a run against the truth's and what they may be: every function is a metric."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import Case, Trajectory
+from crossbody.cases.contacts import CLOSED
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.impulse import away, cumulative, with_collisions
+from crossbody.reports.measuring.multipliers import told
+from crossbody.reports.measuring.scale import idle
+from crossbody.reports.measuring.truth import Truth
+
+UNITS: dict[str, str] = {}
+NEEDS = dict.fromkeys(("complementarity", "lam_error", "lam_impulse", "lam_impulse_path"), "lam")
+
+
+def complementarity(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """How far the multipliers pull, or act where nothing touches, over the largest.
+
+    Max of -lam and of |lam| on open unilateral rows, over max |lam|; NaN where lam is not known. Rows that
+    follow others, those of friction, push either way. Recomputed from lam, gap and mode, never an engine's
+    own flag.
+    """
+    system = equations(case)
+    rows = case.law.unilateral & (True if system is None else np.asarray(system.follows) < 0)
+    if not rows.any():
+        return None
+    if told(run) is None:
+        return math.nan
+    lam = run.lam[:, rows]
+    scale = float(np.max(np.abs(lam), initial=0.0))
+    acting = np.abs(lam[_open(truth, run)[:, rows]])
+    worst = max(float(np.max(-lam, initial=0.0)), float(np.max(acting, initial=0.0)))
+    return worst / scale if scale else 0.0
+
+
+def _open(truth: Truth, run: Trajectory) -> NDArray[np.bool_]:
+    """Samples and rows (n, nc) where nothing touches: by mode; without modes, above all contacts of the truth."""
+    if (run.mode >= 0).all():
+        return ~np.isin(run.mode, CLOSED)
+    touching = np.isin(truth.trajectory.mode, CLOSED)
+    reach = float(np.max(truth.trajectory.gap[touching], initial=0.0))
+    return run.gap > 1.01 * reach + 1e-9 * float(np.max(np.abs(run.gap), initial=0.0))
+
+
+def lam_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Multipliers of rows that are always on against the truth's, point by point, over the largest.
+
+    Max |lam - lam_truth| over max |lam_truth|, or what `idle` rows are measured by. None where a row can
+    open, NaN where lam is not known. Where an instant stands twice lam jumps: its two sides are compared
+    each with its own.
+    """
+    if case.law.unilateral.any():
+        return None
+    if np.isnan(run.lam).any():
+        return math.nan
+    inside, exact = aligned(truth, run)
+    scale = float(np.max(np.abs(exact.lam), initial=0.0))
+    off = float(np.max(np.abs(run.lam[inside] - exact.lam), initial=0.0))
+    return off / max(scale, idle(truth.trajectory)) if scale else None
+
+
+def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Total impulse of the multipliers against the truth's, over the truth's.
+
+    Max over rows of |INT lam dt - INT lam_truth dt| / max over rows of |INT lam_truth dt|; NaN where lam is
+    unknown. Rows that carry nothing are measured by what is `idle`. Both integrals take the same samples by
+    the same rule, so that the error of the rule cancels. Collisions that take no time have no lam and do not
+    count: beside them a compliant truth has samples too few for its own integral.
+    """
+    inside, exact = aligned(truth, run)
+    if not inside.any():
+        return None
+    if np.isnan(run.lam).any():
+        return math.nan
+    mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
+    scale = float(np.max(np.abs(theirs), initial=0.0))
+    least = idle(truth.trajectory) * case.t_end
+    return float(np.max(np.abs(mine - theirs))) / max(scale, least) if scale else None
+
+
+def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Cumulative impulse of the multipliers against the truth's, over the total impulse.
+
+    Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time
+    included. Releases are matched too, as lam jumps there: a sample on the wrong side would count for half
+    its step. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
+    known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
+    many; N s where only the run's does.
+    """
+    inside, exact = aligned(truth, run, releases=True)
+    if not inside.any() or truth.trajectory.counts.get("redundant", 0):
+        return None
+    if np.isnan(run.lam).any():
+        return math.nan
+    theirs = with_collisions(exact, truth.trajectory.events)
+    scale = float(np.max(np.abs(theirs), initial=0.0))
+    smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
+    smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
+    off = float(np.max(np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth], initial=0.0))
+    return off / max(scale, idle(truth.trajectory) * case.t_end) if scale else off or None
