@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from crossbody.cases.case import Case, Limit
-from crossbody.cases.friction_limits import LIMITS as FRICTION
 
 _TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from event to event"
 _FASTER = "of the tolerance, times the ratio of the fastest rate to the motion's"
@@ -19,12 +18,36 @@ _LOCATING = (
 )  # fmt: skip
 """Engines and profiles whose events are located between their steps."""
 _SAMPLED = "the trapezoidal rule between a run's own samples; an impact inside a step costs half its way"
+_OF_MUJOCO = (
+    "MuJoCo's own pyramids, soft contacts and step: friction creeps where it holds, pushes off the slip where it "
+    "slides, and lifts what slides fast"
+)
+_RIGID = (
+    "rigid contacts on a grid of steps: friction begins and ends with a step, and so does what it makes of a velocity"
+)
+_BOUNDED = f"{_RIGID}; its friction is bounded along two axes, not in a cone"
+_OFF_BY = {
+    ("mujoco", "default"): _OF_MUJOCO,
+    ("pinocchio", "admm"): _RIGID,
+    ("drake", "matched"): "stiff contacts on a grid of steps, and friction as a steep function of the slip",
+    ("drake", "default"): (
+        "soft contacts, one a pair of solids, where they are deepest; friction as a function of the slip, and the "
+        "normal force of the step before"
+    ),
+    ("dart", "matched"): _BOUNDED,
+    ("dart", "default"): f"{_BOUNDED}, and what rests is put to sleep",
+}
+_FRICTION = tuple(
+    Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
+    for (engine, profile), known in _OFF_BY.items()
+)
+"""What takes engines with laws of their own outside where contacts or joints of a scene have friction."""
 
 
 def default_limits(case: Case) -> tuple[Limit, ...]:
     """Limits on position, velocity, force, energy, events and drift, as far as the case's rows have such numbers."""
     everyone = tuple(Limit(metric=metric, value=value, why=why) for metric, value, why in _defaults(case))
-    everyone += FRICTION if case.rubs else ()
+    everyone += _FRICTION if case.rubs else ()
     if not case.law.unilateral.any():
         return everyone
     located = (

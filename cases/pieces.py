@@ -1,4 +1,4 @@
-"""Which smooth piece of a motion each instant belongs to."""
+"""Which smooth piece of a motion each instant belongs to, and the period of what swings."""
 
 from __future__ import annotations
 
@@ -19,3 +19,20 @@ def pieces(starts: Floats, t: Floats) -> NDArray[np.intp]:
     before = np.searchsorted(starts, t, side="left") - 1
     after = np.searchsorted(starts, t, side="right") - 1
     return np.clip(np.where(again, after, before), 0, None)
+
+
+CROSSINGS = 3
+
+
+def period(t: Floats, x: Floats) -> float | None:
+    """Return the mean time between upward crossings of x = 0, s; None if there are fewer than `CROSSINGS`.
+
+    Args:
+        t (n,): s.
+        x (n,): what swings about 0.
+    """
+    i = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
+    if len(i) < CROSSINGS:
+        return None
+    crossed = t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i])
+    return float(crossed[-1] - crossed[0]) / (len(i) - 1)

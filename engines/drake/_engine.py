@@ -19,10 +19,9 @@ from crossbody.engines._rubbing import RIGID, RubbingRun
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.drake import _scene
 from crossbody.engines.drake._contacts import APPROXIMATIONS, HOLDS, STICTION, STIFF, Rubs
-from crossbody.engines.drake._plant import plant
+from crossbody.engines.drake._plant import plant, system
 from crossbody.engines.drake._scene import SceneRun
 from crossbody.engines.drake._simulate import Sim
-from crossbody.engines.drake._symbolic import system
 
 SCHEMES = ("runge_kutta5", "runge_kutta3", "bogacki_shampine3", "radau3")
 USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4  # what a Simulator of 1.51.1 starts with

@@ -11,7 +11,6 @@ import numpy as np
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Actuator, Body, Joint, Loop, RowLaw, Scene, Shape, Tendon
 from crossbody.cases.scene_contacts import Contact, contacts
-from crossbody.engines.mujoco._direct import IMPEDANCE, solref_of
 
 POINT = 1e-15  # radius of a corner, m: below the rounding of any place, and above 0, which no ball has
 
@@ -23,6 +22,27 @@ LEAST = 2e-15
 """The smallest moment of inertia that MuJoCo admits, kg m^2 (twice mjMINVAL): it has no point masses."""
 THIN = 1e-14
 """Moment of inertia, kg m^2, up to which a full tensor is at the rounding of what its eigenvalues must be."""
+
+
+# The linear law in the direct format, without regularisation: aref = -B h' - K d h with the impedance
+# d = dmin = dmax at its largest, solref = (-K dmax^2, -B dmax).
+MAX_IMPEDANCE = 0.9999  # MuJoCo clamps d there; it leaves R = (1 - d)/d diagA, a bias of 1e-4 in lam
+IMPEDANCE = (MAX_IMPEDANCE, MAX_IMPEDANCE, 1e-3, 0.5, 1.0)
+"""The solimp that goes with it: the same impedance at every depth."""
+REMAINING = 1e-7
+"""Factor on R. With PGS on one row the error of lam falls with it: 2e-8, 2e-11, 6e-13 at 1e-4, 1e-7, 1e-9."""
+
+
+def solref_of(a0: float, a1: float) -> tuple[float, float]:
+    """Return the solref that gives aref = -a1 h' - a0 h; both negative or zero, or MuJoCo replaces them."""
+    return -MAX_IMPEDANCE * a0, -MAX_IMPEDANCE * a1
+
+
+def without_regularisation(model: Any) -> None:
+    """Scale what R is made from: inverse weights of bodies (contacts), joints (joint rows) and tendons."""
+    model.body_invweight0[:] *= REMAINING
+    model.dof_invweight0[:] *= REMAINING
+    model.tendon_invweight0[:] *= REMAINING
 
 
 def compiled(spec: Any, scene: Scene) -> Any:

@@ -17,8 +17,7 @@ from crossbody.cases.scene_rows import rows_of
 from crossbody.engines._contacts import TOGETHER, Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
-from crossbody.engines.mujoco._build import corner_names
-from crossbody.engines.mujoco._direct import MAX_IMPEDANCE
+from crossbody.engines.mujoco._build import MAX_IMPEDANCE, corner_names
 from crossbody.engines.mujoco._observe import constraint_jacobian, numbers
 from crossbody.engines.mujoco._rubs import AT_BOUND, Rub, Rubs
 from crossbody.engines.nearest import corners

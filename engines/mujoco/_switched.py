@@ -20,7 +20,7 @@ from crossbody.cases.scene_rows import rows_of
 from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import elastic_part
-from crossbody.engines.mujoco._direct import solref_of
+from crossbody.engines.mujoco._build import solref_of
 from crossbody.engines.mujoco._drift import Drift
 from crossbody.engines.mujoco._globals import Hook
 from crossbody.engines.mujoco._observe import constraint_jacobian

@@ -27,8 +27,7 @@ from crossbody.engines._gates import ALL_AT_ONCE
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scale import depths, resolving_step
 from crossbody.engines._scene import Forces
-from crossbody.engines.mujoco._build import compiled, spec_of
-from crossbody.engines.mujoco._direct import without_regularisation
+from crossbody.engines.mujoco._build import compiled, spec_of, without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._gated import GatedRows
 from crossbody.engines.mujoco._globals import Hook, hooked

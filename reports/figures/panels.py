@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.values import coded, number, plain
+from crossbody.reports.figures.styles import coded, number, plain
 
 ACROSS = 0.09  # between two columns, part of the width
 

@@ -1,9 +1,13 @@
-"""How an engine looks: the same colour and dashes in every plot, table and picture of a case."""
+"""How an engine looks in every plot, table and picture of a case, and how plotly is told texts, arrays and axes."""
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
+import numpy as np
+
+from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 
@@ -27,3 +31,20 @@ def style(trace: Trace, i: int) -> dict[str, Any]:
         return {"color": "#888888", "dash": "solid", "width": 4, "strokes": "none"}
     dash = DASHES[i % len(DASHES)]
     return {"color": COLOURS[i % len(COLOURS)], "dash": dash, "width": 1.8, "strokes": STROKES[dash]}
+
+
+def number(row: int) -> str:
+    """How plotly numbers its axes: the first one is not numbered."""
+    return "" if row == 1 else str(row)
+
+
+def plain(text: str) -> str:
+    """A text in which plotly finds no tags."""
+    return text.replace("<", "&lt;")
+
+
+def coded(array: Floats) -> dict[str, str]:
+    """An array as plotly reads it from base64 ("typed array specification")."""
+    text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
+    shape = {"shape": ",".join(map(str, array.shape))} if array.ndim > 1 else {}
+    return {"dtype": f"f{array.itemsize}", "bdata": text} | shape

@@ -1,4 +1,4 @@
-"""Impulse of the multipliers."""
+"""Which multipliers a run shows, and their impulse."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.trajectory import Event, Trajectory
 
@@ -45,3 +46,14 @@ def with_collisions(run: Trajectory, events: Sequence[Event]) -> Floats:
             first, behind = (int(np.searchsorted(run.t, event.t, side=side)) for side in ("left", "right"))
             total[max(first, behind - 1) :, event.contact] += event.impulse
     return total
+
+
+def told(run: Trajectory) -> NDArray[np.bool_] | None:
+    """Which rows have multipliers (nc,); None if lam is not known.
+
+    Of rows that are always on and follow from others lam is NaN from the first sample to the last.
+    """
+    unknown = np.isnan(run.lam)
+    follow = unknown.all(axis=0) & np.all(run.mode == Mode.BILATERAL, axis=0)
+    known = not unknown[:, ~follow].any() and not (follow.any() and follow.all())
+    return ~follow if known else None

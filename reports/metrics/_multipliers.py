@@ -11,8 +11,7 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.equations import equations
-from crossbody.reports.measuring.impulse import away, cumulative, with_collisions
-from crossbody.reports.measuring.multipliers import told
+from crossbody.reports.measuring.impulse import away, cumulative, told, with_collisions
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
 

@@ -21,7 +21,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import off_slip
-from crossbody.reports.measuring.multipliers import told
+from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.scale import idle
 
 if TYPE_CHECKING:

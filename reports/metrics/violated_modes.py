@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from crossbody.reports.measuring.modes import violated
+from crossbody.reports.measuring.equations import violated
 
 if TYPE_CHECKING:
     from crossbody.cases import Case, Trajectory

@@ -11,8 +11,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
-from crossbody.reports.figures.styles import LEVEL, label, style
-from crossbody.reports.figures.values import coded, plain
+from crossbody.reports.figures.styles import LEVEL, coded, label, plain, style
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.scenes.scene import slip
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from crossbody.cases import Mode
 from crossbody.reports.figures.section import Plot, Section
-from crossbody.reports.figures.styles import label, style
-from crossbody.reports.figures.values import coded, plain
+from crossbody.reports.figures.styles import coded, label, plain, style
 from crossbody.reports.pages.figures import robust
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep

@@ -13,8 +13,7 @@ from crossbody.cases import CrossbodyError, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import scenes
 from crossbody.reports.figures.section import Section
-from crossbody.reports.figures.styles import label, style
-from crossbody.reports.figures.values import coded
+from crossbody.reports.figures.styles import coded, label, style
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports.figures.section import Figure, Plot, Section
-from crossbody.reports.figures.styles import COLOURS
-from crossbody.reports.figures.values import plain
+from crossbody.reports.figures.styles import COLOURS, plain
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
 

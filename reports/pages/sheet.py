@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.reports.figures.styles import LEVEL, label, style
-from crossbody.reports.figures.values import coded, number, plain
+from crossbody.reports.figures.styles import LEVEL, coded, label, number, plain, style
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep

@@ -9,8 +9,7 @@ import numpy as np
 
 from crossbody.cases import Mode, Trajectory
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import label
-from crossbody.reports.figures.values import plain
+from crossbody.reports.figures.styles import label, plain
 from crossbody.reports.runs.store import Trace
 
 MODE_COLOURS = {

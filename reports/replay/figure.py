@@ -10,8 +10,7 @@ import pandas as pd
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES
-from crossbody.reports.figures.values import coded, number, plain
+from crossbody.reports.figures.styles import COLOURS, DASHES, coded, number, plain
 
 GREY = "#888888"
 SIGNED = [[0.0, COLOURS[0]], [0.5, "#f4f4f4"], [1.0, COLOURS[3]]]

@@ -11,8 +11,7 @@ from friction_scenes import sphere_on_floor
 
 from crossbody import cases
 from crossbody.cases import Case, Limit
-from crossbody.cases.defaults import limits_of
-from crossbody.cases.friction_limits import KNOWN
+from crossbody.cases.defaults import KNOWN, limits_of
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.verdict import limit_for
 

@@ -18,7 +18,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
-from crossbody.engines.mujoco._direct import MAX_IMPEDANCE, without_regularisation
+from crossbody.engines.mujoco._build import MAX_IMPEDANCE, without_regularisation
 from crossbody.reports import metrics
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits

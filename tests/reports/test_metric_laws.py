@@ -18,7 +18,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
-from crossbody.reports.measuring.multipliers import told
+from crossbody.reports.measuring.impulse import told
 
 
 @pytest.fixture(scope="module", params=[(*case, seed) for case in CASES for seed in range(2)], ids=str)

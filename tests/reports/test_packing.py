@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from unpacked import text_of, value_of
 
-from crossbody.reports.figures.values import coded
+from crossbody.reports.figures.styles import coded
 from crossbody.reports.pages.packing import packed_text, packed_value
 
 

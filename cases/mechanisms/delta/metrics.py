@@ -11,7 +11,7 @@ from crossbody.cases.case import Case
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.metric import CaseMetric
 from crossbody.cases.parameters import of_numbers
-from crossbody.cases.swing import period
+from crossbody.cases.pieces import period
 from crossbody.cases.trajectory import Trajectory
 
 

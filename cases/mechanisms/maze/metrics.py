@@ -10,7 +10,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case
 from crossbody.cases.contacts import at, contacts
 from crossbody.cases.metric import CaseMetric
-from crossbody.cases.swing import period
+from crossbody.cases.pieces import period
 from crossbody.cases.trajectory import Trajectory
 
 FACE_BELOW = 0
