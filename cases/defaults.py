@@ -26,7 +26,7 @@ _RIGID = (
     "rigid contacts on a grid of steps: friction begins and ends with a step, and so does what it makes of a velocity"
 )
 _BOUNDED = f"{_RIGID}; its friction is bounded along two axes, not in a cone"
-_OFF_BY = {
+KNOWN = {
     ("mujoco", "default"): _OF_MUJOCO,
     ("pinocchio", "admm"): _RIGID,
     ("drake", "matched"): "stiff contacts on a grid of steps, and friction as a steep function of the slip",
@@ -39,7 +39,7 @@ _OFF_BY = {
 }
 _FRICTION = tuple(
     Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
-    for (engine, profile), known in _OFF_BY.items()
+    for (engine, profile), known in KNOWN.items()
 )
 """What takes engines with laws of their own outside where contacts or joints of a scene have friction."""
 

@@ -21,19 +21,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import turned
 from crossbody.reports.measuring.alignment import clock, matched
+from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.metrics.position import scale_of
-
-if TYPE_CHECKING:
-    from crossbody.cases import Case, Trajectory
-    from crossbody.reports.measuring.truth import Truth
 
 PARTS = ("importer", "model", "step")
 SPLIT = ("position", "event_times")  # metrics whose error is told apart

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Mode
+from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.remembered import remembered
 from crossbody.cases.scene_contacts import contacts
 from crossbody.reports.measuring.equations import equations
-
-if TYPE_CHECKING:
-    from crossbody.cases import Case, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases import Coordinate, Trajectory
 from crossbody.cases.arrays import Floats
-
-if TYPE_CHECKING:
-    from crossbody.cases import Coordinate, Trajectory
 
 RESTS = 1e-4
 """Coordinates of one unit that all stay below this, in SI, rest: what is left of their motion is known to absolute

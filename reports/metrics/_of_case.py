@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases import Case, Trajectory
+from crossbody.cases.metric import CaseMetric
 from crossbody.reports.measuring.alignment import aligned
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from crossbody.cases import Case, Trajectory
-    from crossbody.cases.metric import CaseMetric
-    from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth
 
 
 @dataclass(slots=True)

@@ -6,20 +6,16 @@ It holds a run against itself, so that it judges engines that follow another law
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases import Mode
+from crossbody.cases import Case, Event, Mode, Trajectory
+from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import AT_REST, CLOSED, LIGHT
+from crossbody.reference import System
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.friction import rubbing
-
-if TYPE_CHECKING:
-    from crossbody.cases import Case, Event, Trajectory
-    from crossbody.cases.arrays import Floats
-    from crossbody.reference import System
-    from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

@@ -12,24 +12,19 @@ law from one that follows this one.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crossbody.cases import Mode
+from crossbody.cases import Case, Inputs, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
+from crossbody.reference import System
 from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import off_slip
 from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.scale import idle
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from crossbody.cases import Case, Inputs, Trajectory
-    from crossbody.reference import System
-    from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

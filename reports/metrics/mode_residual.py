@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from crossbody.cases import Mode
+from crossbody.cases import Case, Event, Mode, Trajectory
+from crossbody.cases.arrays import Bytes, Floats
 from crossbody.reports.measuring.equations import equations
-
-if TYPE_CHECKING:
-    from crossbody.cases import Case, Event, Trajectory
-    from crossbody.cases.arrays import Bytes, Floats
-    from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

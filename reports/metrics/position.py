@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.scale import least, of_like
-
-if TYPE_CHECKING:
-    from crossbody.cases import Case, Trajectory
-    from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False

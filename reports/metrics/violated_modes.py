@@ -5,13 +5,9 @@ Looked for on a fine grid between the run's rows, by the equations and not by th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from crossbody.cases import Case, Trajectory
 from crossbody.reports.measuring.equations import violated
-
-if TYPE_CHECKING:
-    from crossbody.cases import Case, Trajectory
-    from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = True
