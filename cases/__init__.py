@@ -167,7 +167,8 @@ def from_file(
     Args:
         path: of an MJCF file.
         key: one of its keyframes; the first if not given.
-        control: what gives the controls of all actuators, or FILE.py:NAME of a callable, whose tick is given too.
+        control: what gives the controls of all actuators, or FILE.py:NAME of a callable, whose
+            tick is given too.
         overrides: t_end, a0, a1, ctrl, tick and without, as in `crossbody.cases.files.case.PARAMETERS`.
 
     Raises:

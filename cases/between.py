@@ -16,8 +16,8 @@ PARTS = 16  # points looked at from each sample to the next
 def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
     """A function of time: cubic splines on every smooth piece, never across an event.
 
-    Pieces end where an instant stands twice or where a mode changes; a run that knows neither is joined by straight
-    lines, because a spline rings at an impact.
+    Pieces end where an instant stands twice or where a mode changes; a run that knows neither is
+    joined by straight lines, because a spline rings at an impact.
     """
     width = [run.q.shape[1], run.v.shape[1], run.gap.shape[1], run.lam.shape[1], 2]
     columns = np.concatenate([run.q, run.v, run.gap, run.lam, run.energy], axis=1)

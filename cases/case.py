@@ -97,8 +97,8 @@ class Coordinate:
 
     Attributes:
         name, unit: what it is called, and in which SI unit it counts.
-        size, rate: what it and its rate are at least when they do something, in that unit; a motion that stays below is
-            judged by these. 0 where the scene knows none.
+        size, rate: what it and its rate are at least when they do something, in that unit; a
+            motion that stays below is judged by these. 0 where the scene knows none.
     """
 
     name: str
@@ -193,14 +193,16 @@ class Force:
     """What acts on a scene beside its parts, as a function of time and state that engines compile once.
 
     Attributes:
-        function: (t, q (nq,), v (nv,), numbers, out (nv,)) in the scene's coordinates: writes the generalised forces.
-            It keeps nothing, is written in the Python that numba compiles, and so is every function that it calls.
+        function: (t, q (nq,), v (nv,), numbers, out (nv,)) in the scene's coordinates: writes the
+            generalised forces. It keeps nothing, is written in the Python that numba compiles,
+            and so is every function that it calls.
         numbers: that it reads.
         breaks: instants between which it is smooth, s, increasing: no step crosses one.
         rate: fastest with which bodies answer to it, 1/s; 0 where nothing but rows is fast.
-        states: bodies on slides that carry states of a controller or a sensor: their mass is 1, and no energy counts.
-        far, fast (nv,): how far and how fast the joints move, in their units, for absolute tolerances; empty where what
-            drives the start tells.
+        states: bodies on slides that carry states of a controller or a sensor: their mass is 1,
+            and no energy counts.
+        far, fast (nv,): how far and how fast the joints move, in their units, for absolute
+            tolerances; empty where what drives the start tells.
     """
 
     function: Callable[[float, Floats, Floats, Floats, Floats], None]
@@ -217,14 +219,15 @@ class Limit:
     """How large one metric may be for one engine and profile, and why.
 
     Attributes:
-        metric: name of a metric of every case (reports/metrics) or of this one; "*" for a known property that shows in
-            any of them, with no value of its own.
+        metric: name of a metric of every case (reports/metrics) or of this one; "*" for a known
+            property that shows in any of them, with no value of its own.
         value: the largest absolute value that is still within, in the metric's unit.
         engine, profile: which runs it judges; "*" is any.
         why: the reason for the number.
         known: a known property of the engine that takes it outside; empty if it should be within.
-        known_size: how far that property may take it; beyond, it is outside like any other. Where it is infinite, the
-            size is that of a stored run; without one, what lies beyond the limit is not judged.
+        known_size: how far that property may take it; beyond, it is outside like any other. Where
+            it is infinite, the size is that of a stored run; without one, what lies beyond the
+            limit is not judged.
         known_least: how far it takes it at least, where that is known beforehand; 0 where it is not.
         covers_none: whether the property explains too that a run has no such number where the truth has one.
     """
@@ -281,8 +284,8 @@ class Case:
 
     Attributes:
         name, variant: which case; `title` says it in words.
-        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of one's own with them;
-            "scene" where they are those of every scene.
+        mechanism: name of the equations in crossbody.reference.systems, or the path of a file of
+            one's own with them; "scene" where they are those of every scene.
         parameters: every parameter of the case, resolved, SI.
         coordinates: names and units of q.
         contacts: names of the constraint rows.
@@ -291,7 +294,8 @@ class Case:
         quaternions: index in q of the first of the four entries of every quaternion, w first.
         t_end: horizon, s.
         law: constants of every row.
-        real_time: those of an engine that integrates collisions which take no time in the case; None for `law`.
+        real_time: those of an engine that integrates collisions which take no time in the case;
+            None for `law`.
         fsm: machine that switches the rows: "level", "edge" or "memoryless".
         collisions: rule for several contacts: "sequential", "simultaneous" or "resolved".
         closed_form: the exact motion at given times, where one exists (tier A).
@@ -301,18 +305,21 @@ class Case:
         metrics: numbers that runs of this case show beside those that every case has, by name.
         limits: how far engines may be from the truth.
         act0 (na,): activations at the start, of those actuators of the scene that have one; 0 if not given.
-        rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be near dependent).
-        scene: bodies, joints and what acts between them, of which engines build their models; the reference takes the
-            kernels of `mechanism` where there are some. `file` is where it was read from, `findings` what is strange.
+        rank: how many rows of a scene's loops hold; below 0 those that surely do (a loop may be
+            near dependent).
+        scene: bodies, joints and what acts between them, of which engines build their models; the
+            reference takes the kernels of `mechanism` where there are some. `file` is where it
+            was read from, `findings` what is strange.
         force: what acts on the scene beside its parts; the kernels of `mechanism` have it.
-        gates: rows beside those of the scene, and what opens and closes them; the kernels of `mechanism` have theirs.
-        form: (case, whether servos act, whether inputs stand for a sampled controller) -> the case on a scene, for
-            engines, where its own coordinates are others.
-        consistent: whether the start stands on the rows that are always on; False where it is off them on purpose, to
-            show how the law brings it back.
+        gates: rows beside those of the scene, and what opens and closes them; the kernels of
+            `mechanism` have theirs.
+        form: (case, whether servos act, whether inputs stand for a sampled controller) -> the
+            case on a scene, for engines, where its own coordinates are others.
+        consistent: whether the start stands on the rows that are always on; False where it is off
+            them on purpose, to show how the law brings it back.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
-        tight: tolerance at which the reference stands for the truth; larger where a stiff spring on a small mass makes
-            rounding count before that (kp eps |q|/m against the tolerance of a velocity).
+        tight: tolerance at which the reference stands for the truth; larger where a stiff spring on a
+            small mass makes rounding count before that (kp eps |q|/m against the tolerance of a velocity).
         chaos: declared where the truth cannot be trusted to the horizon; None where it must be.
     """
 

@@ -1,7 +1,7 @@
 """What one contact does under h'' + a1 h' + a0 h (+ a2 h^3) = 0, in closed form (docs/explanation/model.md).
 
-w = sqrt(a0), zeta = a1 / (2 w), v0 > 0 the speed of approach. The contact ends when lam = 0, not when h = 0: the
-textbook restitution exp(-pi zeta / sqrt(1 - zeta^2)) belongs to a contact that pulls.
+w = sqrt(a0), zeta = a1 / (2 w), v0 > 0 the speed of approach. The contact ends when lam = 0, not when
+h = 0: the textbook restitution exp(-pi zeta / sqrt(1 - zeta^2)) belongs to a contact that pulls.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ def damping_ratio(a0: float, a1: float) -> float:
 def half_angle(zeta: float) -> float:
     """Th(zeta) = acos(zeta)/sqrt(1 - zeta^2), continued through 1 to acosh(zeta)/sqrt(zeta^2 - 1).
 
-    With y^2 = (1 - zeta)/(1 + zeta) both are 2/(1 + zeta) atan(y)/y, an even series in y: no digits are lost at 1.
+    With y^2 = (1 - zeta)/(1 + zeta) both are 2/(1 + zeta) atan(y)/y, an even series in y: no
+    digits are lost at 1.
     """
     if zeta > 2.0:
         return math.acosh(zeta) / (math.sqrt(zeta - 1.0) * math.sqrt(zeta + 1.0))

@@ -25,7 +25,8 @@ class Contact:
         touch: when it begins, s.
         release: when it ends, s; infinite if it lasts to the end.
         settled: when its COLLISION hands over to CONTACT, s; infinite if it does not.
-        free: when the row is FREE behind it, s: at its release or, let go below the surface, later; infinite if never.
+        free: when the row is FREE behind it, s: at its release or, let go below the surface,
+            later; infinite if never.
     """
 
     row: int
@@ -49,10 +50,10 @@ class Contact:
 def contacts(run: Trajectory, joined: bool = False) -> tuple[Contact, ...]:
     """Every contact in order of its touch; joined, those between which no gap opens are one.
 
-    From the run's events; a run without a notion of mode is read by the sign of its gaps instead. Joined, a row that
-    stays at its surface from the start to the end, or from one contact to the next, is in contact all along: which of
-    two rows pushes that depend on each other, whether one pushes that bears nothing, and what the sign of its gap is,
-    are rounding and no properties of the motion.
+    From the run's events; a run without a notion of mode is read by the sign of its gaps instead.
+    Joined, a row that stays at its surface from the start to the end, or from one contact to the next,
+    is in contact all along: which of two rows pushes that depend on each other, whether one pushes
+    that bears nothing, and what the sign of its gap is, are rounding and no properties of the motion.
     """
     if not run.events and run.mode.size and np.all(run.mode == -1):
         return _by_sign(run)

@@ -2,9 +2,9 @@
 
     u = control(t, q, v)         at t = 0, tick, 2 tick, ..., and held in between
 
-A run has a copy of its own (`Controller`), so that none begins with what another has left. What the callable raises, or
-gives in another form than it should, is wrong use and ends as a `ControlError`; numbers that are not finite end the run
-as any other numerical failure does, by its outcome.
+A run has a copy of its own (`Controller`), so that none begins with what another has left. What the
+callable raises, or gives in another form than it should, is wrong use and ends as a `ControlError`;
+numbers that are not finite end the run as any other numerical failure does, by its outcome.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ class NotFinite(Exception):  # noqa: N818 - an end, not an error: it is caught w
 class Control:
     """A controller u = function(t, q, v) with its tick.
 
-    The callable gets copies of q (nq,) and v (nv,), in the scene's own convention in every engine, and returns the
-    controls (nu,) in the order of the scene's actuators; one number will do for one of them.
+    The callable gets copies of q (nq,) and v (nv,), in the scene's own convention in every engine, and
+    returns the controls (nu,) in the order of the scene's actuators; one number will do for one of them.
 
-    Each run has its own: a class is called for a new instance, an object (or the object of a bound method) is copied
-    deeply as it was handed over, and its `reset()` is called where it has one. A plain function is called as it is:
-    what it keeps outside itself is the user's.
+    Each run has its own: a class is called for a new instance, an object (or the object of a
+    bound method) is copied deeply as it was handed over, and its `reset()` is called where it has
+    one. A plain function is called as it is: what it keeps outside itself is the user's.
 
     Attributes:
         function: the callable, or a class of such.
@@ -148,7 +148,8 @@ class Controller:
         """Ask for the inputs (nu,) from t on; a copy.
 
         Raises:
-            ControlError: if it raises, or gives something else than as many real numbers as there are controls.
+            ControlError: if it raises, or gives something else than as many real numbers as there
+                are controls.
             NotFinite: if it gives NaN or infinity.
         """
         began = perf_counter()

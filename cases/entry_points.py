@@ -1,9 +1,9 @@
 """Arguments of the public entry points, checked by their annotations before anything is computed with them.
 
-Numbers, switches, texts, functions, objects of our own, and lists and tables of them are checked here, in one place.
-Arrays are checked where their shapes are known (`cases._arrays`), and ranges where they have a meaning. Nothing heavy
-is imported: a class is looked up where the function that names it stands, and one that is imported there for the type
-checker alone is known by its name.
+Numbers, switches, texts, functions, objects of our own, and lists and tables of them are checked
+here, in one place. Arrays are checked where their shapes are known (`cases._arrays`), and ranges
+where they have a meaning. Nothing heavy is imported: a class is looked up where the function that
+names it stands, and one that is imported there for the type checker alone is known by its name.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ LISTS = ("Sequence", "Iterable", "Collection", "tuple")
 def checked_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Make a function check the type of each argument before it runs, and tell a wrong one in a sentence.
 
-    The call raises `InvalidValue`, naming function and argument. A float must be finite, unless its default is not.
+    The call raises `InvalidValue`, naming function and argument. A float must be finite, unless
+    its default is not.
     """
 
     @functools.cache

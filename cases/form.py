@@ -1,8 +1,8 @@
 """A case as a scene with coordinates of its own: what engines build where the case counts in others, and the way back.
 
-Equations may be written in coordinates that no tree of joints has: links that each have a position and an angle, angles
-against the horizon, and states of a controller or a sensor beside those of bodies. `Case.form` gives the scene in which
-engines run the same motion.
+Equations may be written in coordinates that no tree of joints has: links that each have a
+position and an angle, angles against the horizon, and states of a controller or a sensor beside
+those of bodies. `Case.form` gives the scene in which engines run the same motion.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ class Form:
         case: the scene with start, law, inputs, control and force in the coordinates of its joints.
         to_case: states (m, ..) of the scene -> those of the case.
         to_scene: the way back.
-        bend: (q, v) of the scene, one state -> J' v, where the case's velocities are J v; None where J is constant.
+        bend: (q, v) of the scene, one state -> J' v, where the case's velocities are J v; None
+            where J is constant.
         rows: of every row of the case the scene's; -1 where joints hold what the row does.
     """
 

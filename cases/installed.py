@@ -5,9 +5,10 @@ The pyproject.toml of a distribution says, for example,
     [project.entry-points."crossbody.cases"]
     gripper = "my_package.gripper"
 
-and likewise for "crossbody.engines", "crossbody.reports.metrics", "crossbody.hw.formats" and every other folder of
-plug-ins. A file is given to `use`, as the commands do with --plugin FILE, pytest with --crossbody-plugin FILE, and both
-with the files that the pyproject.toml of the folder one works in names, or of the nearest folder above it:
+and likewise for "crossbody.engines", "crossbody.reports.metrics", "crossbody.hw.formats" and
+every other folder of plug-ins. A file is given to `use`, as the commands do with --plugin FILE,
+pytest with --crossbody-plugin FILE, and both with the files that the pyproject.toml of the folder
+one works in names, or of the nearest folder above it:
 
     [tool.crossbody]
     plugins = ["engines/euler.py"]  # from the folder of the pyproject.toml
@@ -78,7 +79,8 @@ def use(files: Iterable[str | os.PathLike[str]]) -> None:
     """Import files as plug-ins of this process; one that it has already is left as it is.
 
     Raises:
-        InvalidValue: for a path that is no Python file, a file that defines no plug-in, or a name that is taken.
+        InvalidValue: for a path that is no Python file, a file that defines no plug-in, or a name
+            that is taken.
         SceneError: if a file cannot be imported, with the line.
     """
     for file in files:

@@ -1,8 +1,9 @@
 """Solutions of x'' + a1 x' + a0 x = 0, accurate through the double pole and for any damping.
 
-sigma = a1/2. Below critical damping x = exp(-sigma t) [x0 cos(wd t) + (x1 + sigma x0) sin(wd t)/wd]; from there
-on, with the rates r1 <= r2 and k = (r2 - r1)/2, x = exp(-r1 t) [(x1 + r2 x0) D + x0 E], E = exp(-2 k t),
-D = (1 - E)/(2 k): neither form subtracts what the double pole makes equal, and no exponential overflows.
+sigma = a1/2. Below critical damping x = exp(-sigma t) [x0 cos(wd t) + (x1 + sigma x0) sin(wd
+t)/wd]; from there on, with the rates r1 <= r2 and k = (r2 - r1)/2, x = exp(-r1 t) [(x1 + r2 x0) D
++ x0 E], E = exp(-2 k t), D = (1 - E)/(2 k): neither form subtracts what the double pole makes
+equal, and no exponential overflows.
 """
 
 from __future__ import annotations

@@ -21,11 +21,12 @@ class CaseMetric:
     Attributes:
         doc: what it measures, one line.
         unit: SI unit, "1" for a ratio or a count.
-        number: of (run, case), the number itself; None where there is none, NaN where the run does not show it.
-        signal: of (run, case), values (n, k) at the run's samples: the number is their largest difference from the
-            truth's, on arcs between matched events; None where there are none.
-        instants: of (run, case), times (m,), s, in order: the number is their largest difference from the truth's, None
-            where the truth has none or another number of them.
+        number: of (run, case), the number itself; None where there is none, NaN where the run
+            does not show it.
+        signal: of (run, case), values (n, k) at the run's samples: the number is their largest
+            difference from the truth's, on arcs between matched events; None where there are none.
+        instants: of (run, case), times (m,), s, in order: the number is their largest difference
+            from the truth's, None where the truth has none or another number of them.
         always: whether every run is measured; else where the case claims or limits it.
     """
 

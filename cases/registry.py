@@ -1,7 +1,7 @@
 """The folder is the registry: a module without a leading underscore is a plug-in.
 
-Names are read from the folder, modules are imported only when asked for. Other distributions add theirs by entry
-points, and users by files (`crossbody.cases.installed`); of two of one name ours is taken.
+Names are read from the folder, modules are imported only when asked for. Other distributions add theirs
+by entry points, and users by files (`crossbody.cases.installed`); of two of one name ours is taken.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """A scene as data: bodies on joints, shapes, loops, tendons and actuators, in SI units and world axes with z up.
 
-Coordinates: q (nq) and v (nv) stand in the order of `Scene.joints`. A hinge or slide has one of each; a ball joint has
-a quaternion (w first) and its angular velocity in body axes; a free joint has the position and quaternion of its body
-in the world, the velocity of the body's origin in world axes and its angular velocity in body axes.
+Coordinates: q (nq) and v (nv) stand in the order of `Scene.joints`. A hinge or slide has one of
+each; a ball joint has a quaternion (w first) and its angular velocity in body axes; a free joint
+has the position and quaternion of its body in the world, the velocity of the body's origin in
+world axes and its angular velocity in body axes.
 
 A scene is a value: frozen, checked once, hashable; `replace` makes a changed copy.
 """
@@ -116,14 +117,15 @@ class Joint(_Named):
         type: free, ball, slide or hinge.
         axis, anchor: in body axes, unit and m.
         reference: coordinate at the pose of `Body.position`, m or rad; slide and hinge alone.
-        range: lowest and highest coordinate, m or rad; of a ball joint 0 (it becomes -inf) and the largest angle.
+        range: lowest and highest coordinate, m or rad; of a ball joint 0 (it becomes -inf) and
+            the largest angle.
         margin: distance to the bound at which its row begins to act.
         armature: added to the joint's inertia, kg m^2 or kg.
         damping: b0, b1, b2 of the force -(b0 v + b1 v |v| + b2 v^3).
         stiffness: k0, k1, k2 of the force -(k0 x + k1 x^2 + k2 x^3), x = q - rest.
         rest: where the spring is at rest: one number, or four of a quaternion.
-        friction_loss: bound of dry friction along each of its velocities, N m or N: it holds up to that, and takes so
-            much against them where it slides.
+        friction_loss: bound of dry friction along each of its velocities, N m or N: it holds up
+            to that, and takes so much against them where it slides.
         force_range: bounds of the sum of the actuators' forces on it.
         law: of the rows of its bounds; a slip that friction holds decays by it.
     """
@@ -270,9 +272,10 @@ class Loop(_Named):
     """Rows that are always on.
 
     Attributes:
-        type: connect (two points stay together), weld (two frames do), joint or tendon (the first's coordinate or
-            length follows the second's by a polynomial).
-        first, second: names of two bodies (the second may be empty: the world), joints or tendons (it may be empty).
+        type: connect (two points stay together), weld (two frames do), joint or tendon (the
+            first's coordinate or length follows the second's by a polynomial).
+        first, second: names of two bodies (the second may be empty: the world), joints or tendons
+            (it may be empty).
         first_position, second_position: of the points in body axes, m.
         orientation: of the second body in the first, for a weld.
         polynomial: x1 - x1ref = c0 + c1 y + ... + c4 y^4, y = x2 - x2ref, for joints and tendons.
@@ -376,8 +379,8 @@ class Actuator(_Named):
         gear: one number; of a ball or free joint, as many as it has velocities.
         gain: g0, g1, g2.
         bias: b0, b1, b2.
-        armature: gear^2 armature is added to the joint's, kg m^2; a tendon cannot have it. Of several gears the first
-            counts, for every velocity of the joint.
+        armature: gear^2 armature is added to the joint's, kg m^2; a tendon cannot have it. Of
+            several gears the first counts, for every velocity of the joint.
         damping: -gear^2 damping v acts on the joint likewise, or along the tendon.
         control_range, force_range: bounds of u, and of the force.
         activation: integrator or filter; empty where a = u.

@@ -22,20 +22,21 @@ PLACES = {
     ("plane", "ellipsoid"): 1, ("sphere", "sphere"): 1, ("sphere", "capsule"): 1, ("sphere", "cylinder"): 1,
     ("sphere", "box"): 1, ("capsule", "capsule"): 2, ("plane", "hull"): 256,
 }  # fmt: skip
-"""Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull, lowest and
-highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules one, or where they end
-if they lie along each other. Of a hull it is the most: each has as many as corners."""
+"""Number of places where two shapes may meet: over a plane ends of a capsule, corners of a box or a hull,
+lowest and highest points of a cylinder's caps, or where it stands four points of its rim; of two capsules
+one, or where they end if they lie along each other. Of a hull it is the most: each has as many as corners."""
 WAYS = ("t1", "t2")
 """Directions across the normal: over a plane its x and y, else those of `crossbody.reference.tree.pair_slip`."""
 Pose = tuple[Floats, Floats]  # rotation (3, 3) and origin (3,), m
 SAME_GAP = 1e-9  # m, to which a bound's gap is that of two shapes: the places of bodies are rounded
 STEEPEST = 0.5
-"""Largest sine between the axes of capsules that lie along each other: where they stand as a T, no end of the one is
-that of the other."""
+"""Largest sine between the axes of capsules that lie along each other: where they stand as a T,
+no end of the one is that of the other."""
 LEVELLED = 1e-14  # sine of the angle between an axis and a plane below which it lies in it: rounding
 WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6
-"""Largest sine at which capsules lie along each other; and of the sum of two capsules' radii, by how much their gap may
-be too large that is taken where they end. Last, the largest tilt with which a cylinder stands."""
+"""Largest sine at which capsules lie along each other; and of the sum of two capsules' radii, by
+how much their gap may be too large that is taken where they end. Last, the largest tilt with
+which a cylinder stands."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +45,8 @@ class Contact:
 
     Attributes:
         pair: whose.
-        first, second: its shapes, in the order in which the rows are written: the normal leads from first to second.
+        first, second: its shapes, in the order in which the rows are written: the normal leads
+            from first to second.
         places: number of its normal rows.
     """
 
@@ -82,8 +84,8 @@ class Contact:
 def parallel(first: Shape, second: Shape) -> float:
     """Return the sine of the angle below which two capsules lie along each other, or a cylinder stands on a plane.
 
-    Axes a distance d apart that cross in the middle of a length L at an angle a are L^2 a^2 / 8d further apart where it
-    ends. It is 0 for other shapes.
+    Axes a distance d apart that cross in the middle of a length L at an angle a are L^2 a^2 / 8d
+    further apart where it ends. It is 0 for other shapes.
     """
     if first.type == "plane" and second.type == "cylinder":
         return LEVEL
@@ -172,9 +174,9 @@ class _Axes:
 def by_shapes(scene: Scene) -> Scene:
     """Return the scene with pairs of shapes in the place of lower bounds that are the distance of two shapes.
 
-    An engine with contacts of its own lets shapes touch. A bound is one of these if its gap is that of a sphere and a
-    sphere or plane, on the bodies between which it is, at the reference pose. Unless all bounds are, it is the scene as
-    it stands: rows keep their order.
+    An engine with contacts of its own lets shapes touch. A bound is one of these if its gap is
+    that of a sphere and a sphere or plane, on the bodies between which it is, at the reference
+    pose. Unless all bounds are, it is the scene as it stands: rows keep their order.
     """
     poses, pairs = _reference_poses(scene), list[Pair]()
     joints, tendons = (

@@ -45,7 +45,8 @@ class Event:
         contact: index of the constraint row.
         before: mode before.
         after: mode after.
-        impulse: impulse of a frozen collision (docs/explanation/model.md) at its end, N s; 0 where lam is finite.
+        impulse: impulse of a frozen collision (docs/explanation/model.md) at its end, N s; 0
+            where lam is finite.
     """
 
     t: float
@@ -110,13 +111,15 @@ class Trajectory:
         wall_s: time of the run itself, s (no preparation).
         counts: further counters of the solver (right-hand sides, rejections, ...).
         ledger: work of every row, if it was asked for.
-        inputs: what acted on it, where a controller of the user's own gave some of it; None where the case says it.
-        sol: sol(t) gives q (..., nq) and v (..., nv) at instants t (...), s, between the samples too, and
-            sol(t, side="left") what they are before an event there; None where not asked for, by `dense=True`.
-        determined_until: until when the law determines the motion, s; finite where contacts that slide share a load as
-            no law says (the message names it `indeterminate`).
-        unique_until: until when one motion alone keeps the law, s; finite where more than one set of sticking, sliding
-            and open contacts does (`modes_not_unique`).
+        inputs: what acted on it, where a controller of the user's own gave some of it; None where
+            the case says it.
+        sol: sol(t) gives q (..., nq) and v (..., nv) at instants t (...), s, between the samples
+            too, and sol(t, side="left") what they are before an event there; None where not asked
+            for, by `dense=True`.
+        determined_until: until when the law determines the motion, s; finite where contacts that
+            slide share a load as no law says (the message names it `indeterminate`).
+        unique_until: until when one motion alone keeps the law, s; finite where more than one set
+            of sticking, sliding and open contacts does (`modes_not_unique`).
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 

@@ -24,8 +24,8 @@ TURN = 1e-3  # angle or length over which H is differenced: the fourth power and
 SHARP = 30.0
 """Times the tilt of a cap, or the squared sine at which capsules cross: part of TURN that H is differenced over."""
 MIXED = 1e-5
-"""Part of a rate's change over TURN, or of what TURN makes of the rate, by which differences over one step and over
-two part where there is a kink in between; where there is none they do by 1e-6."""
+"""Part of a rate's change over TURN, or of what TURN makes of the rate, by which differences over
+one step and over two part where there is a kink in between; where there is none they do by 1e-6."""
 ONE_SIDED = np.array([[-25.0 / 12.0, 4.0, -3.0, 4.0 / 3.0, -0.25], [1.0, -4.0, 6.0, -4.0, 1.0]])
 """Slope at the first of five points, and what is none of a cubic through them."""
 TOGETHER = 64
@@ -139,8 +139,8 @@ class Contacts:
         Args:
             poses: of the bodies.
             rows: which; all if not given.
-            along: of contacts in `turning`, whether the shapes lie along each other, at all instants or at each (...);
-                as they do, if not given.
+            along: of contacts in `turning`, whether the shapes lie along each other, at all
+                instants or at each (...); as they do, if not given.
         """
         choice = self._choice_of(rows)
         R, p = self._placed(poses, choice)
@@ -162,8 +162,8 @@ class Contacts:
     def lying(self, poses: Poses, rows: Sequence[int]) -> tuple[dict[int, bool], float]:
         """Return of the shapes of some rows whether they lie along each other, and over what H may be differenced.
 
-        The nearest points of axes that cross at a small angle a run along them in a turn of the size of a^2, the lowest
-        of a cap round it in one of its tilt.
+        The nearest points of axes that cross at a small angle a run along them in a turn of the
+        size of a^2, the lowest of a cap round it in one of its tilt.
         """
         found: dict[int, bool] = {}
         least, choice = 1.0, self._choice_of(rows)
@@ -207,8 +207,9 @@ class Contacts:
     def parted(self, poses: Poses, which: Sequence[int]) -> tuple[Floats, Floats]:
         """Return by how much the shapes of some pairs in `turning` do not lie along each other, and to which side (n,).
 
-        The first is below 0 if they do, in units of the sine, or of the first capsule's half length, at which that
-        changes. The second, 1 of a cylinder, changes its sign where capsules turn through each other's direction.
+        The first is below 0 if they do, in units of the sine, or of the first capsule's half
+        length, at which that changes. The second, 1 of a cylinder, changes its sign where
+        capsules turn through each other's direction.
         """
         found, ways = np.zeros(len(which)), np.ones(len(which))
         for i, pair in enumerate(self.all[k] for k in which):
@@ -313,14 +314,16 @@ def flat(met: Sequence[Contact]) -> bool:
 class Flat:
     """Rows of points of bodies over planes, whose H' v is written out.
 
-    A body moves its point at x (1 behind its coordinates) at T x, and accelerates it at (T' + T T) x. Seen from the
-    plane, with the normal n and T1, a point that moves at T2 accelerates, where no coordinate does, as
+    A body moves its point at x (1 behind its coordinates) at T x, and accelerates it at (T' + T
+    T) x. Seen from the plane, with the normal n and T1, a point that moves at T2 accelerates,
+    where no coordinate does, as
 
         h'' = n.(T2' + T2 T2 - T1' - T1 T1 - 2 T1 (T2 - T1)) x
 
     Args:
         contacts: all of which are `flat`.
-        frames: rotations and origins of `Contacts.bodies` in the frames whose poses are given, of all rows in them.
+        frames: rotations and origins of `Contacts.bodies` in the frames whose poses are given, of
+            all rows in them.
 
     Attributes:
         one, two (n,): numbers of the bodies of the plane and of the point.

@@ -8,8 +8,9 @@
 active is COLLISION for a row with two sets of constants, else CONTACT; out of COLLISION, BALLISTIC is
 COLLISION_SEPARATION. Velocities are continuous: every row follows its law in real time (the rule `resolved`).
 
-h' counts as zero below 1e-9 of the largest rate seen, lam as zero below what rounding makes of it. A gap below -1e-9 m
-that does not close was started in penetration: it is active if it would press, else BALLISTIC.
+h' counts as zero below 1e-9 of the largest rate seen, lam as zero below what rounding makes of
+it. A gap below -1e-9 m that does not close was started in penetration: it is active if it would
+press, else BALLISTIC.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ SLOW, DEEP, EPS = 1e-9, 1e-9, 0.01
 NOISE = 1e-13  # part of the terms of a row's acceleration that `Rows.pressure` says is their rounding
 PUSHES, ULP = 1e-9, float(np.finfo(float).eps)  # part of the largest multiplier below which one is rounding
 UNMET = 1e-6
-"""Of what makes up a row's acceleration: by so much more than its law asks does it part where it depends on others that
-contradict it, as of a sphere within another: no multipliers let both follow their laws, and it would have to pull."""
+"""Of what makes up a row's acceleration: by so much more than its law asks does it part where it
+depends on others that contradict it, as of a sphere within another: no multipliers let both
+follow their laws, and it would have to pull."""
 UNMOVED = 1e-24
 """Of the largest diagonal entry of H M^-1 H^T: the rate of a row which no motion moves is rounding, and has no dips."""
 
@@ -55,7 +57,8 @@ class View:
 def least_push(G: Floats, demand: Floats) -> Floats:
     """Return multipliers lam >= 0 (n,) with G lam >= demand and the least lam.G lam, by least distance programming.
 
-    G (n, n) may be singular; where nothing fulfils the demand they are what comes nearest (Lawson and Hanson 1974, 23).
+    G (n, n) may be singular; where nothing fulfils the demand they are what comes nearest (Lawson
+    and Hanson 1974, 23).
     """
     values, ways = np.linalg.eigh(G)
     size = float(np.abs(demand).max(initial=0.0)) or 1.0
@@ -76,9 +79,10 @@ class LevelMachine:
 
     Args:
         rows: of the mechanism.
-        rtol: to which positions are known; rows that close touch together where it cannot tell which comes first.
-        fast: rate that counts as seen from the start, of bodies that move along their rows and not against them: what
-            is let go there, as far as positions are known, does not touch before it closes.
+        rtol: to which positions are known; rows that close touch together where it cannot tell
+            which comes first.
+        fast: rate that counts as seen from the start, of bodies that move along their rows and not against
+            them: what is let go there, as far as positions are known, does not touch before it closes.
     """
 
     def __init__(self, rows: Rows, rtol: float = 0.0, fast: float = 0.0) -> None:
@@ -161,8 +165,8 @@ class LevelMachine:
     def _catching_too(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes, fired: Fired) -> Fired:
         """The rows below the surface that would press as one is caught, and whose rates are zero as well.
 
-        Of rows that one motion moves alike the one that was located first need not be the one that bears: the law of
-        another may ask for more.
+        Of rows that one motion moves alike the one that was located first need not be the one
+        that bears: the law of another may ask for more.
         """
         below = [i for i in self.own if modes[i] != FREE and modes[i] not in ACTIVE]
         if not any(i in below and which == PUSH for i, which in fired):
@@ -176,8 +180,9 @@ class LevelMachine:
     def _iterate(self, q: Floats, v: Floats, h: Floats, hd: Floats, modes: Modes) -> tuple[Modes, list[Passed], bool]:
         """All rows together; one at a time once a set of modes has repeated; a cycle if that repeats too.
 
-        Then the set of the least motion, if it is consistent: many rows of one body, of which few can follow their law.
-        It is taken too where rows that contradict each other push, and one of them lags behind its law.
+        Then the set of the least motion, if it is consistent: many rows of one body, of which few
+        can follow their law. It is taken too where rows that contradict each other push, and one
+        of them lags behind its law.
         """
         seen, passed, one_by_one = {modes}, list[Passed](), False
         deep = max(DEEP, self._known(q))

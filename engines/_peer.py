@@ -1,8 +1,9 @@
 """What the engines for bodies on a line share: a prepared run, and trajectories from what an engine recorded.
 
-An adaptive integrator records its steps alone. Where a gap changes its sign between two of them, the state there is
-put in from the one on the open side, whose acceleration is constant while nothing touches; likewise where a force
-falls to zero below the surface. A straight line would misplace both by more than the run is wrong.
+An adaptive integrator records its steps alone. Where a gap changes its sign between two of them,
+the state there is put in from the one on the open side, whose acceleration is constant while
+nothing touches; likewise where a force falls to zero below the surface. A straight line would
+misplace both by more than the run is wrong.
 """
 
 from __future__ import annotations

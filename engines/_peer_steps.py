@@ -1,6 +1,7 @@
 """Engines that step bodies on a line in time, with impacts solved inside a step: one loop for all of them.
 
-lam is the impulse of the step before an instant over its length, from the balance of momentum, M (v+ - v) + M g dt.
+lam is the impulse of the step before an instant over its length, from the balance of momentum, M
+(v+ - v) + M g dt.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ DEPENDENT = 1e6
 def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
     """Constants, start, and functions at zero input: M (n, n), bias (n,) = -f, H (nc, n), lam (nc,) N, gap (nc,) m.
 
-    Constants and lam are those of rows just entered, with the fast constants where a row has two sets. lam has every
-    row active; NaN where the rows are dependent.
+    Constants and lam are those of rows just entered, with the fast constants where a row has two
+    sets. lam has every row active; NaN where the rows are dependent.
     """
     law = np.where(system.beta[:, :1] > 0.0, system.beta, system.alpha)
 

@@ -1,8 +1,8 @@
 """Whether a cylinder rolled on its rim through no tilt, where rigid rows do not say how it goes on.
 
-The lowest point of a cap goes round its rim the faster, the less the tilt. What passes level by at a least distance
-goes on by an angle that is not small, however small the distance, and on the other side by the opposite one; what
-passes through level in a plane touches with the opposite point.
+The lowest point of a cap goes round its rim the faster, the less the tilt. What passes level by at
+a least distance goes on by an angle that is not small, however small the distance, and on the other
+side by the opposite one; what passes through level in a plane touches with the opposite point.
 """
 
 from __future__ import annotations

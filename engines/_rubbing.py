@@ -1,8 +1,8 @@
 """Scenes with friction in engines that step in time: one loop, and their forces at points as the rows of a scene.
 
-An engine finds contacts by itself: it tells points, and forces there. A point is the place of its pair that is nearest,
-a force is laid along the frame of that place's rows. lam is the force in the step before an instant. Inputs change
-with the step at or behind their instant; the horizon is a whole number of steps.
+An engine finds contacts by itself: it tells points, and forces there. A point is the place of its pair
+that is nearest, a force is laid along the frame of that place's rows. lam is the force in the step before
+an instant. Inputs change with the step at or behind their instant; the horizon is a whole number of steps.
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ def resolving_step(law: Law, depth: float = 0.0, steps: int = 20) -> float:
 
     Args:
         law: constants of every row; the fast ones count too.
-        depth: penetration at which the cubic part is linearised, m: w^2 = a0 + 3 a2 d^2. a1 bounds the step as well.
+        depth: penetration at which the cubic part is linearised, m: w^2 = a0 + 3 a2 d^2. a1
+            bounds the step as well.
         steps: in half a period.
     """
     stiffness = np.maximum(law.a0 + 3 * law.a2 * depth**2, law.b0)
@@ -27,7 +28,8 @@ def resolving_step(law: Law, depth: float = 0.0, steps: int = 20) -> float:
 def depths(constants: Floats, h: Floats, hd: Floats, hdd: Floats, opens: Any) -> tuple[Floats, Floats]:
     """Return how deep and how fast (nc,) rows get if what drives them at the start does so until they close.
 
-    v^2/2 is |h'' h| and what moves and what is stored at the start; a0 d^2/2 + a2 d^4/4 holds it at the deepest.
+    v^2/2 is |h'' h| and what moves and what is stored at the start; a0 d^2/2 + a2 d^4/4 holds it
+    at the deepest.
 
     Args:
         constants: a0, a1, a2 (3, nc).

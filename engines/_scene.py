@@ -1,8 +1,8 @@
 """What a scene adds to an engine's own rigid bodies: springs, dampers, actuators and rows, in NumPy.
 
-Written from the scene's definitions, not from the reference's kernels, so that an engine that uses it is a witness.
-States are the scene's: x (nv,) is the coordinate of every slide and hinge in the place of its velocity, and 0 in those
-of free and ball joints, whose springs act along the rotation from where they rest.
+Written from the scene's definitions, not from the reference's kernels, so that an engine that uses it is a
+witness. States are the scene's: x (nv,) is the coordinate of every slide and hinge in the place of its
+velocity, and 0 in those of free and ball joints, whose springs act along the rotation from where they rest.
 """
 
 from __future__ import annotations
@@ -115,7 +115,8 @@ class Forces:
         at: joint -> its first position.
         place: joint -> its first velocity.
         single (2, ns): positions and velocities of slides and hinges.
-        u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N. pushed: whether any is not 0.
+        u (nu,): controls in force. pushes (np, 3): forces at centres of mass, N. pushed: whether
+            any is not 0.
         t: now, s; it counts where there are activations. since: when the controls were put in force, s.
         act (nu,): activations then, of the actuators that have one.
         T (nt, nv): dl/dx of the tendons, 0 of those between points.
@@ -124,7 +125,8 @@ class Forces:
         plain (n,): positions of the joints whose bounds are all that there are; None where others have some.
         steady: whether what actuators do changes with the controls alone; held (nv,): that.
         none: whether nothing but pushes ever acts.
-        spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics; None without them.
+        spans: (q, v) -> lengths of the tendons between points, by an engine's own kinematics;
+            None without them.
     """
 
     scene: Scene

@@ -26,8 +26,8 @@ class Run(ABC):
     Attributes:
         engine, profile: who runs it.
         settings: what was really used, for provenance (tolerance, step, solver, ...).
-        follows: the same scene under the machine, the collision rule and the law that the engine really integrates,
-            where they are not the case's own; its step error is then measured against those.
+        follows: the same scene under the machine, the collision rule and the law that the engine really
+            integrates, where they are not the case's own; its step error is then measured against those.
     """
 
     engine: str
@@ -48,8 +48,8 @@ class Run(ABC):
         """Return the physics as it reached the engine, for the parity audit.
 
         Keys: masses, gravity, constants, q0, v0; and where the engine exposes them the functions
-        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates; and `hidden`, quantity -> why this
-        mechanism's model does not show it, beside what the engine's own `hidden` says.
+        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates; and `hidden`, quantity
+        -> why this mechanism's model does not show it, beside what the engine's own `hidden` says.
         """
 
     def native(self) -> float:
@@ -64,12 +64,14 @@ class Engine(ABC):
         name: as in engines.names().
         profiles: profile -> one sentence; the first is the default one.
         versions: package -> version, for provenance.
-        hidden: profile ("*" for all) -> quantity -> why it does not show it. Whatever of `QUANTITIES` is not named here
-            it must show: the parity audit and the metrics count what is missing as wrong.
-        orders: profile -> promised order of the error in its step `dt` or its tolerance `rtol`; the benchmark holds the
-            observed one against it.
-        of_scenes: profile -> the one that stands for it in a scene, a robot's file say, where all profiles are meant.
-        interpreted: profile ("*" for all) -> what of its timed runs is Python, which the benchmark says beside them.
+        hidden: profile ("*" for all) -> quantity -> why it does not show it. Whatever of `QUANTITIES` is
+            not named here it must show: the parity audit and the metrics count what is missing as wrong.
+        orders: profile -> promised order of the error in its step `dt` or its tolerance `rtol`;
+            the benchmark holds the observed one against it.
+        of_scenes: profile -> the one that stands for it in a scene, a robot's file say, where all
+            profiles are meant.
+        interpreted: profile ("*" for all) -> what of its timed runs is Python, which the
+            benchmark says beside them.
     """
 
     name: str
@@ -90,8 +92,9 @@ class Engine(ABC):
 
         Args:
             case: the scene.
-            profile: one of `profiles`. "matched" is the one that follows the case's own law most closely: the first
-                of an engine that has no profile of that name. `Run.profile` says which one it was.
+            profile: one of `profiles`. "matched" is the one that follows the case's own law most
+                closely: the first of an engine that has no profile of that name. `Run.profile`
+                says which one it was.
             settings: of the profile, by name.
 
         Raises:

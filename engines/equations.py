@@ -20,7 +20,8 @@ def builder(mechanism: str) -> Callable[..., System] | None:
     """What builds the equations of a mechanism from (parameters, law); None where there are none.
 
     Args:
-        mechanism: a module of reference/systems with `build`, or the path of a file (ends in .py) with `system`.
+        mechanism: a module of reference/systems with `build`, or the path of a file (ends in .py)
+            with `system`.
     """
     if mechanism.endswith(".py"):
         return getattr(module(mechanism), "system", None)

@@ -1,8 +1,8 @@
 """Small motions about an equilibrium as engines give them: what they are asked, and what they answer.
 
-An engine's coordinates y may be others than the case's q, with v = T y', or more (a clock, a ball that stands still):
-T (n, ny) and its right inverse S (ny, n). At rest, where y'' = 0, a derivative J (ny, 2 ny) of y'' by (y, y') is
-T J diag(S, S) in the case's coordinates, whatever the second derivatives of the chart.
+An engine's coordinates y may be others than the case's q, with v = T y', or more (a clock, a ball that
+stands still): T (n, ny) and its right inverse S (ny, n). At rest, where y'' = 0, a derivative J (ny, 2 ny)
+of y'' by (y, y') is T J diag(S, S) in the case's coordinates, whatever the second derivatives of the chart.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class Tangent:
 
     Attributes:
         way: how it was made, in the engine's own words.
-        slope (n, 2 n): derivative of v' by (q, v), in the case's coordinates, or in those of its tangent space.
+        slope (n, 2 n): derivative of v' by (q, v), in the case's coordinates, or in those of its
+            tangent space.
         known: a known property of the engine that takes it off; empty if it should be right.
         explained: what this property alone would make of the right derivative; None where it tells no number.
     """

@@ -1,7 +1,7 @@
 """Where shapes are nearest: gaps, normals and points of any number of pairs, at any number of instants at once.
 
-Arrays have leading dimensions (...) that broadcast against each other: pairs, instants, or none. Nearest points are
-sought in each shape's own axes, and nothing here knows a derivative.
+Arrays have leading dimensions (...) that broadcast against each other: pairs, instants, or none.
+Nearest points are sought in each shape's own axes, and nothing here knows a derivative.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ def meet(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Pos
         sizes: of both, `Shape.extents`: (..., 3), or of hulls (..., places, 3).
         at: poses of the first shapes.
         by: poses of the second shapes.
-        along: whether capsules lie along each other, or cylinders stand (...), as `lying` says; else not looked at.
+        along: whether capsules lie along each other, or cylinders stand (...), as `lying` says;
+            else not looked at.
     """
     if kinds[0] == "plane":
         return _over_plane(kinds[1], sizes[1], at, by, along)
@@ -70,8 +71,8 @@ def lying(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Po
 def across(kind: str, one: Floats, two: Floats, normal: Floats) -> Floats:
     """Return the two directions (2, 3) across a normal along which tangential rows are counted.
 
-    Over a plane they are its x and y; else Frisvad's frame of the normal in axes of the second shape that are turned
-    so that no symmetry meets its pole (`crossbody.reference.tree.pair_slip`).
+    Over a plane they are its x and y; else Frisvad's frame of the normal in axes of the second
+    shape that are turned so that no symmetry meets its pole (`crossbody.reference.tree.pair_slip`).
 
     Args:
         kind: type of the first shape.

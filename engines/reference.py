@@ -108,9 +108,10 @@ def within_the_model(case: Case, run: Trajectory) -> Trajectory:
 class Reference(Engine):
     """The project's own integrators; see `crossbody.engines.Engine`.
 
-    A mechanism is a module in reference/systems with `build(parameters, law) -> System`, or a file of the user's own by
-    its path (ends in .py) with `system(parameters, law) -> System`, which may be the case's own file. It may have
-    `listed(p)`, what the parity audit lists, and `check_start(parameters, q0, v0)`, which raises SceneError.
+    A mechanism is a module in reference/systems with `build(parameters, law) -> System`, or a
+    file of the user's own by its path (ends in .py) with `system(parameters, law) -> System`,
+    which may be the case's own file. It may have `listed(p)`, what the parity audit lists, and
+    `check_start(parameters, q0, v0)`, which raises SceneError.
     """
 
     name = "reference"
@@ -142,15 +143,16 @@ class Reference(Engine):
         Args:
             case: the scene.
             profile: one of `profiles`.
-            settings: rtol, atol, ledger, samples, fsm, max_steps, time_limit; shortcuts and implicit of `compiled`,
-                and of a scene in it traced, "kept", "yes" or "no"; index of `ida`. `samples` is a number of equidistant
-                rows, or their times.
+            settings: rtol, atol, ledger, samples, fsm, max_steps, time_limit; shortcuts and
+                implicit of `compiled`, and of a scene in it traced, "kept", "yes" or "no"; index
+                of `ida`. `samples` is a number of equidistant rows, or their times.
 
         Raises:
             UnknownName: for a profile or setting that does not exist.
             CaseUnsupported: for a mechanism or a collision rule that is not there.
             InvalidValue: for a setting outside its range.
-            SceneError: for a kernel that is wrong, or a start off the rows that are always on (`Case.consistent`).
+            SceneError: for a kernel that is wrong, or a start off the rows that are always on
+                (`Case.consistent`).
         """
         solver, used, options = self._chosen(case, profile, settings)
         system = system_of(case, TRACED[str(used.get("traced", KEPT))])

@@ -1,8 +1,9 @@
 """How much a file may unfold to: a stated memory while it is read, and a bounded amount of numbers in all.
 
-Readers refuse by the sizes that a file declares (`Budget.hold`) and by those that they meet (`Budget.spend`). Behind
-both stands a last resort: while a library parses, the process may not grow beyond the budget (`Budget.guard`), so that
-an unchecked declaration ends in the library's own failure to allocate, not in the machine's.
+Readers refuse by the sizes that a file declares (`Budget.hold`) and by those that they meet
+(`Budget.spend`). Behind both stands a last resort: while a library parses, the process may not
+grow beyond the budget (`Budget.guard`), so that an unchecked declaration ends in the library's
+own failure to allocate, not in the machine's.
 """
 
 from __future__ import annotations
@@ -71,7 +72,8 @@ class Budget:
         """Count what was decoded, and look at the clock of this thread.
 
         Raises:
-            LogFormatError: if the file unfolds to more than it may in all, or takes longer than any log of its size.
+            LogFormatError: if the file unfolds to more than it may in all, or takes longer than
+                any log of its size.
         """
         taken = self.taken + (0.0 if math.isnan(self._entered) else time.thread_time() - self._entered)
         if taken > self.seconds:

@@ -25,9 +25,9 @@ _reserved = False  # whether Arrow's own allocator has its addresses
 def parsing(path: Path, what: str, row: int | None = None, column: str = "") -> Iterator[None]:
     """Run calls into a parser.
 
-    Damaged input makes these libraries raise anything (struct.error, KeyError, zlib.error, OverflowError, ...), so
-    everything but an absent package and our own errors is taken as the file's fault; the cause stays chained. What
-    they print, a stranger may have written: it is dropped.
+    Damaged input makes these libraries raise anything (struct.error, KeyError, zlib.error,
+    OverflowError, ...), so everything but an absent package and our own errors is taken as the file's
+    fault; the cause stays chained. What they print, a stranger may have written: it is dropped.
 
     Args:
         path: the log.
@@ -77,9 +77,10 @@ def fault(path: Path, what: str, error: Exception, row: int | None = None, colum
 def plain_allocator(path: Path) -> Iterator[None]:
     """Let Arrow allocate as the C library does, so that what is bounded is what it uses.
 
-    Its own allocator reserves a gigabyte for its first byte, and some of Arrow asks it all the same. Within a bound on
-    the process's memory that leaves too little for the rest, and some of Arrow's threads and destructors abort the
-    process where memory is denied to them: that byte is asked for first, outside of the bound.
+    Its own allocator reserves a gigabyte for its first byte, and some of Arrow asks it all the
+    same. Within a bound on the process's memory that leaves too little for the rest, and some of
+    Arrow's threads and destructors abort the process where memory is denied to them: that byte is
+    asked for first, outside of the bound.
     """
     import pyarrow as pa
 

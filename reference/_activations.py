@@ -1,8 +1,8 @@
 """Activations of actuators: a' = u of an integrator, tau a' = u - a of a filter, each held within its range.
 
-Inputs hold from one change to the next. So each activation is known there in closed form, from the instant t0 at which
-it was a0: t0 and a0 are two more inputs, and there is nothing to integrate. Where an activation comes to an end of its
-range is an instant too, at which an input changes.
+Inputs hold from one change to the next. So each activation is known there in closed form, from the
+instant t0 at which it was a0: t0 and a0 are two more inputs, and there is nothing to integrate.
+Where an activation comes to an end of its range is an instant too, at which an input changes.
 """
 
 from __future__ import annotations

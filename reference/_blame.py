@@ -20,8 +20,8 @@ LOOKS = 60  # states ahead, each twice as far as the one before
 def not_finite(system: System, t: float, y: Floats, u: Floats, p: Floats, active: Index, ahead: float) -> str:
     """Name the kernel and the entry that first gives NaN or infinity, as the start of a sentence; empty if none does.
 
-    Solvers keep no state at which a kernel gave NaN: what is not found at the last state is looked for ahead of it, on
-    the parabola that it sets out on.
+    Solvers keep no state at which a kernel gave NaN: what is not found at the last state is
+    looked for ahead of it, on the parabola that it sets out on.
 
     Args:
         system: the mechanism.
@@ -93,8 +93,8 @@ def _values(
 def vanished(system: System, active: Index, start: Floats, q: Floats, v: Floats) -> list[int]:
     """Return the rows in force that hardly anything moves at the end of a run, and something did at its start.
 
-    Such a row, which has still to move, asks for velocities beyond all bounds: a string that its law pulls on where it
-    is as short as it can be.
+    Such a row, which has still to move, asks for velocities beyond all bounds: a string that its
+    law pulls on where it is as short as it can be.
 
     Args:
         system: the mechanism.

@@ -1,7 +1,8 @@
 """A controller in Python as a kernel `control`: compiled code calls it by the address in the kernel's own state.
 
-The kernel is compiled once for all controllers. Nothing passes through a frame of compiled code as an exception: what
-the controller raises is kept, the inputs stay as they were, and the run is told to end at the present instant.
+The kernel is compiled once for all controllers. Nothing passes through a frame of compiled code
+as an exception: what the controller raises is kept, the inputs stay as they were, and the run is
+told to end at the present instant.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """The motion between the steps of a run: from marks at the ends of steps the loop itself goes on to any instant.
 
-What the loop needs to go on is its workspace. A mark is a copy of it, and what a step from there writes down as a
-sample is the integrator's own dense output, moved onto the rows where the step is long for them. So nothing of the
-method is written again here, and memory is bounded: where marks take more than `ROOM`, every second one is dropped, and
-the steps between two marks are taken again when an instant between them is asked for.
+What the loop needs to go on is its workspace. A mark is a copy of it, and what a step from there
+writes down as a sample is the integrator's own dense output, moved onto the rows where the step
+is long for them. So nothing of the method is written again here, and memory is bounded: where
+marks take more than `ROOM`, every second one is dropped, and the steps between two marks are
+taken again when an instant between them is asked for.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ class Marks:
 
     Args:
         run: the run, wherever it stands.
-        room: bytes that they may take; where a controller in Python gives inputs every step has its mark all the same,
-            since no step with a tick can be taken again.
+        room: bytes that they may take; where a controller in Python gives inputs every step has
+            its mark all the same, since no step with a tick can be taken again.
 
     Attributes:
         times: instants of the marks, s.
@@ -94,9 +95,9 @@ class Motion:
 
         Args:
             t: within [t_min, t_max].
-            side: which limit where an event falls on an instant, "right" behind it, "left" before it. They differ in
-                v alone, and only where a collision takes no time or a switch makes v jump; at t = 0 "left" is the start
-                as it was given.
+            side: which limit where an event falls on an instant, "right" behind it, "left" before
+                it. They differ in v alone, and only where a collision takes no time or a switch
+                makes v jump; at t = 0 "left" is the start as it was given.
 
         Raises:
             InvalidValue: for an instant outside the run, or another word.

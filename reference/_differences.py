@@ -29,8 +29,8 @@ def differs(
         claimed: derivatives (m,) along it.
         terms: sizes (m,) of the terms that the derivatives are made of.
         size: those of the function itself.
-        slopes: what is claimed (m,) at other positions. A kink nearer than the least width shows in it: no difference
-            admits what is right there, but one lies between what is claimed on both sides.
+        slopes: what is claimed (m,) at other positions. A kink nearer than the least width shows in it:
+            no difference admits what is right there, but one lies between what is claimed on both sides.
     """
     here, wrong, last = function(q), np.ones(len(claimed), dtype=bool), None
     for width in WIDTHS:

@@ -84,8 +84,8 @@ def ensemble(
         options: as in `Options`, without samples, events and dense: nothing is recorded on the way.
 
     Raises:
-        SceneError: for an array of another shape, if a kernel is wrong at the first start (`System.check`), or if a
-            start is off a row that is always on (`Options.consistent`).
+        SceneError: for an array of another shape, if a kernel is wrong at the first start
+            (`System.check`), or if a start is off a row that is always on (`Options.consistent`).
         UnknownName: for a parameter or constant that the system does not have.
         InvalidValue: for an option or a number of threads outside its range.
     """

@@ -1,9 +1,9 @@
 """What a compiled function reads, as one digest.
 
-numba freezes the values of globals and closures, and all that a function calls, into its machine code, but looks for
-changes in the function's own file alone. The digest here covers what numba freezes: bytecode, constants and defaults,
-the globals and closure that the bytecode names, and the functions among these in the same way. Comments, docstrings,
-line numbers and globals that are not read are no part of it.
+numba freezes the values of globals and closures, and all that a function calls, into its machine code,
+but looks for changes in the function's own file alone. The digest here covers what numba freezes:
+bytecode, constants and defaults, the globals and closure that the bytecode names, and the functions among
+these in the same way. Comments, docstrings, line numbers and globals that are not read are no part of it.
 
 Libraries (numba, numpy, the standard library) count by their versions.
 """

@@ -40,8 +40,8 @@ class GuardedCall:
         """Call the kernel twice, with other values beyond its arrays and in what it must fill; return what it filled.
 
         Raises:
-            SceneError: naming kernel, array and entry, if it writes what it may only read, reads or writes beyond an
-                array, or leaves an entry unfilled.
+            SceneError: naming kernel, array and entry, if it writes what it may only read, reads
+                or writes beyond an array, or leaves an entry unfilled.
         """
         first, second = (self._call(dict.fromkeys(self.order, AROUND[i]), INSIDE[i]) for i in range(2))
         for name, wanted in self.outputs.items():

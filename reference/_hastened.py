@@ -18,8 +18,8 @@ _resolve = BaseFunction.get_call_type
 def hastened() -> Iterator[None]:
     """Compile without collecting garbage, and resolve what is called with numbers once; within another, do nothing.
 
-    A compiler makes objects by the million that all live as long as it works. For a sum of two numbers numba tries
-    forty signatures, thousands of times.
+    A compiler makes objects by the million that all live as long as it works. For a sum of two
+    numbers numba tries forty signatures, thousands of times.
     """
     if BaseFunction.get_call_type is not _resolve:
         yield

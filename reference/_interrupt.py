@@ -15,8 +15,8 @@ LONG_S = 1e-3
 class Interrupts:
     """Hold SIGINT back from `hold` on, to the next `answer` or the end of the block.
 
-    The libraries through which compiled code is entered run Python of their own, and may take a KeyboardInterrupt that
-    meets them there for a fault of what they were given.
+    The libraries through which compiled code is entered run Python of their own, and may take a
+    KeyboardInterrupt that meets them there for a fault of what they were given.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,9 @@
 """Functions that are parts of compiled ones: typed and lowered once, optimised only where the whole is put together.
 
-numba optimises every function on its own, with all that it calls, and once more in each function that calls it: for
-a program of three hundred short functions that is most of the time. A part is kept as it was lowered. The function
-that is called from outside takes all its parts at once, makes them private, and is optimised once.
+numba optimises every function on its own, with all that it calls, and once more in each function
+that calls it: for a program of three hundred short functions that is most of the time. A part is
+kept as it was lowered. The function that is called from outside takes all its parts at once,
+makes them private, and is optimised once.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
     def _close_circles(self) -> None:
         """Let functions that call themselves, or each other in turn, find what they call inside the whole.
 
-        numba calls it through a variable that is filled once the name can be seen from outside, which of a part it
-        never can, and in code that is read back it is not filled at all.
+        numba calls it through a variable that is filled once the name can be seen from outside,
+        which of a part it never can, and in code that is read back it is not filled at all.
         """
         whole = self._final_module
         for called in {function.name for function in _defined(whole)}.intersection(_circles(whole)):

@@ -1,7 +1,7 @@
 """The compiled loop with its one fixed signature: compiled once, for every mechanism.
 
-Compiled code takes the kernels of a mechanism by their addresses, in one array: ten functions handed over from Python
-cost more than a short run, and to name them as constants is to compile anew in every process.
+Compiled code takes the kernels of a mechanism by their addresses, in one array: ten functions handed over
+from Python cost more than a short run, and to name them as constants is to compile anew in every process.
 """
 
 from __future__ import annotations

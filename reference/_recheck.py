@@ -1,13 +1,14 @@
 """Look again at a finished motion: does every row stand in the mode that the level machine asks for, all the time?
 
-An event search looks for switches; this looks for modes that do not hold, on a fine grid between all rows of the
-motion, and so does not repeat the mistakes of a search:
+An event search looks for switches; this looks for modes that do not hold, on a fine grid between
+all rows of the motion, and so does not repeat the mistakes of a search:
 
     FREE          below the surface
     active        the multiplier pulls
     BALLISTIC     above the surface; or closing below it, where the row would press
 
-Between two rows the motion is the quintic through q, v and v' at both. The equations themselves tell its error.
+Between two rows the motion is the quintic through q, v and v' at both. The equations themselves
+tell its error.
 """
 
 from __future__ import annotations
@@ -80,9 +81,9 @@ def recheck(
         collisions: the rule for rows with fast constants, as in `Options`.
 
     Returns:
-        The worst place of each row, mode and reason. Where a controller acts, `switch` keeps numbers that a motion
-        does not record, q' is not v, contacts have friction, or there is one row alone, only the motion's own rows are
-        looked at.
+        The worst place of each row, mode and reason. Where a controller acts, `switch` keeps
+        numbers that a motion does not record, q' is not v, contacts have friction, or there is
+        one row alone, only the motion's own rows are looked at.
     """
     rtol = arguments.real("rtol", rtol)
     rows = np.flatnonzero(np.asarray(system.unilateral, dtype=bool) & (np.asarray(system.follows) < 0)).tolist()
@@ -247,8 +248,8 @@ class _Recheck:
     def _force(self, i: int, row: int, step: Floats) -> Floats:
         """What the tolerance and the steps (k,) of a stretch leave open in a multiplier (k,), N.
 
-        The tolerance does as rounding does, but by errors of the motion. A step of nanoseconds from one event to the
-        next is shorter than what tells the speed from where it begins and ends.
+        The tolerance does as rounding does, but by errors of the motion. A step of nanoseconds from
+        one event to the next is shorter than what tells the speed from where it begins and ends.
         """
         e, run = self.equations, self.run
         modes = [*run.mode[row].tolist()]

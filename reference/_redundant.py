@@ -1,7 +1,8 @@
 """Rows that follow from others: which they are at a start, and whether they still follow at the end of a motion.
 
-A planar loop that is closed by points in space has rows that depend on each other. Which of them are left out is
-decided once, at an assembled start, and stays so: off the rows the rank is full of noise. What was left out is watched.
+A planar loop that is closed by points in space has rows that depend on each other. Which of them
+are left out is decided once, at an assembled start, and stays so: off the rows the rank is full
+of noise. What was left out is watched.
 """
 
 from __future__ import annotations
@@ -72,8 +73,8 @@ def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
     Args:
         system: the mechanism.
         q: positions (nq,).
-        groups: rows that are scaled by one length, the largest of them: one a loop. Each by its own would lift a row
-            that is nothing but rounding to the size of the others.
+        groups: rows that are scaled by one length, the largest of them: one a loop. Each by its
+            own would lift a row that is nothing but rounding to the size of the others.
 
     Raises:
         SceneError: for a mass matrix that is not positive definite.
@@ -111,8 +112,8 @@ def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
 def watched(system: System, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where a row that was left out is not held by the others.
 
-    The multipliers of what was left out are NaN: with those of the rows that they follow from they are one of many.
-    Its mode is that of rows that are always on: the others hold it.
+    The multipliers of what was left out are NaN: with those of the rows that they follow from
+    they are one of many. Its mode is that of rows that are always on: the others hold it.
     """
     left_out: Index = np.asarray(system.redundant)
     if not len(left_out) or not len(run.t):

@@ -219,7 +219,8 @@ class CompiledRun:
     def _ended(self, code: int) -> Outcome:
         """The outcome of a code; an account or a pivot that a kernel spoilt by NaN is neither open nor vanished.
 
-        Where steps fell to nothing because nothing moves a row any more, the equations are ill posed, not stiff.
+        Where steps fell to nothing because nothing moves a row any more, the equations are ill
+        posed, not stiff.
         """
         spoilt = code == layout.INCONSISTENT and not np.isfinite(self.state["energy_open"][0])
         if code == layout.ILL_POSED:

@@ -23,14 +23,15 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
         q0: positions at the start (nq,), finite.
         v0: velocities at the start (n,), finite.
         t_end: horizon, s, above 0.
-        options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples, consistent, ledger, ...
+        options: as in `Options`: inputs, rtol, atol, fsm, collisions, solver, samples,
+            consistent, ledger, ...
 
     Returns:
         The motion. Numerical failure is its `outcome`, with place and state in `message`.
 
     Raises:
-        SceneError: if q0 or v0 has another shape or is not finite, if a kernel is wrong there (`System.check`), or if
-            the start is off a row that is always on (`Options.consistent`).
+        SceneError: if q0 or v0 has another shape or is not finite, if a kernel is wrong there
+            (`System.check`), or if the start is off a row that is always on (`Options.consistent`).
         InvalidValue, UnknownName: for an option outside what it admits.
     """
     run = prepare(system, q0, v0, checked(t_end, options))

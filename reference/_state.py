@@ -12,8 +12,8 @@ from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Bytes, Floats, Index
 
 NOISE = 1e-3
-"""Of the largest row's size: a row that no motion moves (the end of a capsule on its hinge) has no size of its own,
-and is off by the rounding of positions as the others are."""
+"""Of the largest row's size: a row that no motion moves (the end of a capsule on its hinge) has
+no size of its own, and is off by the rounding of positions as the others are."""
 
 
 class State:

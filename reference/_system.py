@@ -38,26 +38,30 @@ class System:
         n: number of velocities, and of positions unless nq says otherwise.
         nq: number of positions, at least n; more than n only with the kernel `velocity`.
         dynamics, gaps, rows, energy, power, velocity, solve, control, watch, switch: kernels as in
-            `crossbody.reference.kernels`; control may be a `crossbody.cases.Control`, a callable of Python, too.
-        quaternions: index in q of the first of the four entries, w first, of every quaternion. Its length is 1 in all
-            that is handed over; inside a step it may differ by the tolerance, which kernels must bear.
+            `crossbody.reference.kernels`; control may be a `crossbody.cases.Control`, a callable
+            of Python, too.
+        quaternions: index in q of the first of the four entries, w first, of every quaternion.
+            Its length is 1 in all that is handed over; inside a step it may differ by the
+            tolerance, which kernels must bear.
         parameters: p of the kernels: an array, or names with values in the kernels' order.
         a0, a1, a2 (nc,): slow constants of every row; a number serves all rows (docs/explanation/model.md).
         b0, b1, b2 (nc,): fast constants of COLLISION; b0 = 0 where a row has one set only.
         unilateral (nc,): False for a row that is always on.
-        redundant: indices of rows that are always on but follow from the others: they are held by these and stay off,
-            mode FREE with a multiplier of 0. A run in which their gaps open ends as inconsistent.
+        redundant: indices of rows that are always on but follow from the others: they are held by these and
+            stay off, mode FREE with a multiplier of 0. A run in which their gaps open ends as inconsistent.
         loose: of each of these the part of it that does not follow, 0 if not given: so far its gap may open.
-        findings: sentences on what was decided when the system was made; they stand in the message of every run.
-        follows (nc,): index of the row whose activity this one shares (a slip row follows its normal row); -1 none.
-        mu (nc,): of a row that follows: coefficient of Coulomb friction. It is a tangential row, one of at most two
-            of its normal row that stand one behind the other, with H v the velocity along an orthonormal direction:
-            |lam_t| <= mu lam_n, and lam_t = -mu lam_n v_t/|v_t| where it slides. While it sticks it has its own law
-            with a0 = 0: a1, or sqrt(a0) of the normal row, pulls a slip velocity back. Infinite, if not given, for a
-            row that never slides.
-        friction_loss (nc,): bound of a row's own dry friction, N or N m; 0, if not given, without. It follows no other
-            and none follows it, has h = 0, and |lam| <= friction_loss, with equality against H v where it slides. Its
-            law while it sticks is that of a tangential row.
+        findings: sentences on what was decided when the system was made; they stand in the
+            message of every run.
+        follows (nc,): index of the row whose activity this one shares (a slip row follows its
+            normal row); -1 none.
+        mu (nc,): of a row that follows: coefficient of Coulomb friction. It is a tangential row, one
+            of at most two of its normal row that stand one behind the other, with H v the velocity
+            along an orthonormal direction: |lam_t| <= mu lam_n, and lam_t = -mu lam_n v_t/|v_t| where
+            it slides. While it sticks it has its own law with a0 = 0: a1, or sqrt(a0) of the normal
+            row, pulls a slip velocity back. Infinite, if not given, for a row that never slides.
+        friction_loss (nc,): bound of a row's own dry friction, N or N m; 0, if not given, without. It
+            follows no other and none follows it, has h = 0, and |lam| <= friction_loss, with equality
+            against H v where it slides. Its law while it sticks is that of a tangential row.
         drift (nc,): velocity of the surface along a tangential row, m/s: v_t = H v - drift.
         mass_block: k, the size of the blocks on the mass matrix's diagonal; n if not given.
         inputs: nu, length of u.
@@ -65,21 +69,26 @@ class System:
         memory: length of the controller's state s.
         tick: sampling period of `control`, s.
         guards: length of g of `watch`.
-        discrete: discrete variables at the start; they follow the parameters in p, and each change is an event.
+        discrete: discrete variables at the start; they follow the parameters in p, and each
+            change is an event.
         latched: numbers that `switch` alone writes; they follow the discrete variables in p.
-        kinks: how many of the last discrete variables say on which side of a kink a force is that goes on there: the
-            motion has its derivatives all the same. 0 stands for the side on which the state is. With kinks the very
-            last numbers of p, counted in `latched`, are the run's tolerance and the inputs in force.
-        span (nc, 2): first coordinate, and one past the last, that a row's H may touch; all of them if not given.
-            With it the cost of a chain grows with its length, not with its square.
-        above (n,): the nearest lower coordinate that M couples each one to, -1 for none: M is zero where neither of two
-            is above the other. The one before it in its block if not given; a tree's parents make M cost its depth.
+        kinks: how many of the last discrete variables say on which side of a kink a force is that
+            goes on there: the motion has its derivatives all the same. 0 stands for the side on
+            which the state is. With kinks the very last numbers of p, counted in `latched`, are
+            the run's tolerance and the inputs in force.
+        span (nc, 2): first coordinate, and one past the last, that a row's H may touch; all of them
+            if not given. With it the cost of a chain grows with its length, not with its square.
+        above (n,): the nearest lower coordinate that M couples each one to, -1 for none: M is
+            zero where neither of two is above the other. The one before it in its block if not
+            given; a tree's parents make M cost its depth.
         constant_mass: M does not depend on q: it is factored once.
-        activations: what some inputs follow from the others by, in closed form: the last ones, which no caller gives.
+        activations: what some inputs follow from the others by, in closed form: the last ones,
+            which no caller gives.
         affine: M and H are constant, f depends on u alone: arcs in closed form are admitted.
 
     Raises:
-        SceneError: naming the field, its shape and the shape wanted; or the kernel that does not fill what it must.
+        SceneError: naming the field, its shape and the shape wanted; or the kernel that does not
+            fill what it must.
     """
 
     n: int
@@ -429,9 +438,9 @@ class System:
             t_end: the random states lie at times in [0, t_end], s; gaps are looked at there, and at t_end.
 
         Raises:
-            SceneError: naming the kernel, the entry and both values: if h, H, h' and H'v do not belong together, if M
-                is not symmetric and positive definite, if something is left unfilled or read or written beyond an
-                array, or if `span`, `constant_mass` or `affine` are not true.
+            SceneError: naming the kernel, the entry and both values: if h, H, h' and H'v do not belong
+                together, if M is not symmetric and positive definite, if something is left unfilled or
+                read or written beyond an array, or if `span`, `constant_mass` or `affine` are not true.
         """
         from crossbody.reference._check import check_kernels
 
@@ -473,8 +482,9 @@ class System:
     def project(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats]:
         """Put a state onto the rows that are always on, by the least change in the metric of M.
 
-        Positions by Newton's method, q - M^-1 H^T (H M^-1 H^T)^-1 h, until h = 0 up to rounding; velocities there,
-        v - M^-1 H^T (H M^-1 H^T)^-1 H v. Rows may depend on each other; one whose law has a1 alone holds no position.
+        Positions by Newton's method, q - M^-1 H^T (H M^-1 H^T)^-1 h, until h = 0 up to rounding;
+        velocities there, v - M^-1 H^T (H M^-1 H^T)^-1 H v. Rows may depend on each other; one
+        whose law has a1 alone holds no position.
 
         Args:
             q: positions (nq,).
@@ -495,7 +505,8 @@ class System:
         """A copy of q0 or v0.
 
         Raises:
-            SceneError: if it has another shape than (nq,) or (n,), is not finite, or holds a quaternion that is zero.
+            SceneError: if it has another shape than (nq,) or (n,), is not finite, or holds a
+                quaternion that is zero.
         """
         return self._copied(name, value)
 

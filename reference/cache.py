@@ -1,8 +1,8 @@
 """Compiled functions whose machine code is kept between processes.
 
-Each overload is kept under a digest of all that it reads (`_fingerprint`), of its signature, of numba's version and
-settings and of the processor, so that code which is found is code that would be compiled again. What has no digest is
-compiled in every process.
+Each overload is kept under a digest of all that it reads (`_fingerprint`), of its signature, of
+numba's version and settings and of the processor, so that code which is found is code that would
+be compiled again. What has no digest is compiled in every process.
 """
 
 from __future__ import annotations
@@ -55,8 +55,9 @@ def debugging() -> bool:
 class Lean(CPUDispatcher):  # type: ignore[misc]
     """A compiled function that goes when nothing refers to it, and keeps no more than its machine code.
 
-    numba keeps every variable's type and value for `inspect_types`, in a list that outlives the function as long as
-    anything in it lives. A function that names kernels, and hangs on one of them, would hold itself.
+    numba keeps every variable's type and value for `inspect_types`, in a list that outlives the
+    function as long as anything in it lives. A function that names kernels, and hangs on one of
+    them, would hold itself.
     """
 
     frozen_values: list[Any] | None = None
@@ -116,8 +117,8 @@ class Compiled(Lean):
     def _marked(self) -> Iterator[str]:
         """Put the digest of what is read into the function's name while it is compiled; empty if there is none.
 
-        The names of machine code come from it: two versions of one function, compiled in two processes and read back
-        by a third, would have the same one, and the linker would take either for both.
+        The names of machine code come from it: two versions of one function, compiled in two processes
+        and read back by a third, would have the same one, and the linker would take either for both.
         """
         plain = self.py_func.__qualname__
         try:
@@ -234,8 +235,8 @@ def _told(environment: Environment) -> tuple[str, list[Any], str]:
 def _environment(module: str, constants: list[Any], name: str) -> Environment:
     """Give a function its constants back.
 
-    numba imports its module for that, which compiled code does not ask for: of numba's own linear algebra it takes
-    longer than all else.
+    numba imports its module for that, which compiled code does not ask for: of numba's own linear
+    algebra it takes longer than all else.
     """
     found = lookup_environment(name)
     if found is None:

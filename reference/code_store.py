@@ -1,8 +1,9 @@
 """The folder of compiled code: every file is checked before it is believed.
 
-Reading a file back runs what it says, so that it must be ours: a regular file, no link, that belongs to this user or to
-root and that nobody else may write. A digest tells whether it is whole. What is not is dropped and compiled again. A
-folder that cannot be used is told once, in a sentence on stderr, and nothing is kept: no run fails for it.
+Reading a file back runs what it says, so that it must be ours: a regular file, no link, that
+belongs to this user or to root and that nobody else may write. A digest tells whether it is
+whole. What is not is dropped and compiled again. A folder that cannot be used is told once, in a
+sentence on stderr, and nothing is kept: no run fails for it.
 """
 
 from __future__ import annotations

@@ -56,27 +56,31 @@ class Options:
         rtol: relative tolerance in [1e-14, 0.1].
         atol: absolute tolerance; rtol/1000 if not given.
         fsm: "level", "edge" or "memoryless" (docs/explanation/model.md).
-        collisions: how rows with fast constants collide: at one instant, "sequential" or "simultaneous", or
-            "resolved" in real time (docs/explanation/model.md). Rows with one set of constants are always resolved.
+        collisions: how rows with fast constants collide: at one instant, "sequential" or
+            "simultaneous", or "resolved" in real time (docs/explanation/model.md). Rows with one
+            set of constants are always resolved.
         solver: "compiled", "ida" or "cvode".
         samples: times of the rows; None for every step and both sides of every event.
-        dense: give the motion `sol`, q and v at any instant of it by the integrator's own dense output. The run keeps
-            what it needs to go on from the ends of its steps, 64 MB of it at most (beyond that of every second step, of
-            every fourth, ..., which are taken again when they are asked for; where a controller in Python gives
-            inputs, of every step).
+        dense: give the motion `sol`, q and v at any instant of it by the integrator's own dense
+            output. The run keeps what it needs to go on from the ends of its steps, 64 MB of it
+            at most (beyond that of every second step, of every fourth, ..., which are taken again
+            when they are asked for; where a controller in Python gives inputs, of every step).
         inputs: (times, values) held from each time on; None for zero.
-        consistent: the start stands on the rows that are always on, h = 0 and H v = 0, up to 1000 times the tolerance
-            and rounding; one that does not is refused, and the nearest that does is offered (`System.project`). False
-            admits a start off its rows, which the law then brings back: h'' + a1 h' + a0 h + a2 h^3 = 0.
+        consistent: the start stands on the rows that are always on, h = 0 and H v = 0, up to 1000
+            times the tolerance and rounding; one that does not is refused, and the nearest that
+            does is offered (`System.project`). False admits a start off its rows, which the law
+            then brings back: h'' + a1 h' + a0 h + a2 h^3 = 0.
         ledger: keep the energy account.
-        events: keep every event; without them (and with `samples`) memory does not grow with the number of bounces.
+        events: keep every event; without them (and with `samples`) memory does not grow with the
+            number of bounces.
         shortcuts: closed-form arcs where the scene is affine.
         implicit: the implicit method where the explicit one is bound by stability.
         index: 1, or 3 for bilateral rows under "ida".
         max_step: longest step, s.
         max_steps: bound on steps.
-        time_limit: bound on processor time, s, and ten times as long by the clock; looked at between slices of steps.
-            It does not end a kernel that never returns: only its process can be ended, as the command line does.
+        time_limit: bound on processor time, s, and ten times as long by the clock; looked at
+            between slices of steps. It does not end a kernel that never returns: only its process
+            can be ended, as the command line does.
     """
 
     t_end: float
@@ -138,8 +142,8 @@ class Options:
     def absolute(self, system: System) -> Floats:
         """Absolute tolerances of q and v (nq + n,).
 
-        A quaternion's entries are measured by its length, 1, however small they are; half of it, since an angle is
-        twice their change.
+        A quaternion's entries are measured by its length, 1, however small they are; half of it,
+        since an angle is twice their change.
         """
         found: Floats = np.full(system.nq + system.n, self.tolerance, dtype=np.float64)
         found[system.quaternion_entries] += 0.5 * self.rtol
@@ -156,7 +160,8 @@ class Options:
         """Whether any row of the system collides at one instant.
 
         Raises:
-            InvalidValue: for frozen collisions of another machine than level, or of a row whose fast law is not linear.
+            InvalidValue: for frozen collisions of another machine than level, or of a row whose
+                fast law is not linear.
         """
         fast = np.asarray(system.b0) > 0.0
         if self.collisions == "resolved" or not np.any(fast):

@@ -2,9 +2,9 @@
 
     h(q) = 0,   H(q) v = 0        for every row that is always on
 
-A row of `follows` is on only with the row that it follows, and one whose law has a1 alone holds a rate: it asks nothing
-of h. Off its rows a system moves as the law has it, h'' + a1 h' + a0 h + a2 h^3 = 0, under multipliers that no
-mechanism has: a motion of its own, and seldom the one that was meant.
+A row of `follows` is on only with the row that it follows, and one whose law has a1 alone holds a
+rate: it asks nothing of h. Off its rows a system moves as the law has it, h'' + a1 h' + a0 h + a2 h^3
+= 0, under multipliers that no mechanism has: a motion of its own, and seldom the one that was meant.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ class OffRowsError(SceneError):
     Attributes:
         row: which.
         off: what its gap and its rate are.
-        near: positions (nq,) and velocities (n,) of the nearest start on all such rows; None if none was found.
+        near: positions (nq,) and velocities (n,) of the nearest start on all such rows; None if
+            none was found.
     """
 
     def __init__(self, run: str, row: int, off: str, near: tuple[Floats, Floats] | None) -> None:
@@ -118,8 +119,8 @@ def _placed(system: System, held: Index) -> NDArray[np.bool_]:
 def _off(state: State, held: Index, part: float, absolute: float) -> NDArray[np.bool_]:
     """Which rows are off by more than this part of every coordinate's size, and this beside it, explain.
 
-    An error of q turns the rows: along v they turn by H' v. One that says what a joint does already is made of terms
-    that cancel: of H nothing is left that would tell their rounding.
+    An error of q turns the rows: along v they turn by H' v. One that says what a joint does
+    already is made of terms that cancel: of H nothing is left that would tell their rounding.
     """
     H, q, v = np.abs(state.H[held]), state.sizes(), np.abs(state.v)
     terms = ROUNDING * (1.0 + q.max())

@@ -1,8 +1,8 @@
 """The command `crossbody`.
 
-Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2: wrong use, told in one
-sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130: interrupted. Whatever is not needed to
-read the command line is imported by the command that needs it.
+Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2:
+wrong use, told in one sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130:
+interrupted. Whatever is not needed to read the command line is imported by the command that needs it.
 """
 
 from __future__ import annotations
@@ -285,7 +285,8 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps
 def audit(file: Path, limit: float, **asked: Any) -> int:
     """Check whether engines read the same robot from FILE.
 
-    FILE is MJCF or URDF, read by every engine's own reader; differences are listed with their place and cause.
+    FILE is MJCF or URDF, read by every engine's own reader; differences are listed with their
+    place and cause.
     """
     from crossbody.reports.commands.audit import Ask
 

@@ -100,7 +100,8 @@ def progress(steps: int | None, done: int | None = None) -> Iterator[Callable[[s
 
     Args:
         steps: how many in all; None where nobody knows.
-        done: how many are done already, where each is told of when it is done; else each is told of when it begins.
+        done: how many are done already, where each is told of when it is done; else each is told
+            of when it begins.
     """
     if silent() or not sys.stderr.isatty():
         yield lambda _text: None

@@ -1,6 +1,7 @@
 """What the text of a robot file says that its compiler would pass over, or take for ever to say.
 
-A file may come from anywhere: it includes nothing from outside its folder, and it has no more bodies than a scene.
+A file may come from anywhere: it includes nothing from outside its folder, and it has no more
+bodies than a scene.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ def check_text(path: Path) -> None:
     """Check a file and what it includes; what is no XML is left to the compiler, which names the line.
 
     Raises:
-        SceneError: for more bodies than a scene may have, for an include from outside the folder, for too many bytes.
+        SceneError: for more bodies than a scene may have, for an include from outside the folder,
+            for too many bytes.
     """
     _count(path, path.resolve().parent, {path.resolve()})
 

@@ -1,7 +1,7 @@
 """A URDF as a compiled model and a scene: MuJoCo's compiler reads the tree, its inertias are read here.
 
-The compiler refuses links without mass and inertias that no body can have, and repairs others in silence. It is given a
-placeholder for every link, and the file's own numbers go into the scene unchanged.
+The compiler refuses links without mass and inertias that no body can have, and repairs others in silence.
+It is given a placeholder for every link, and the file's own numbers go into the scene unchanged.
 """
 
 from __future__ import annotations

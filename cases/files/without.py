@@ -65,8 +65,8 @@ def strip(model: Any, without: str) -> None:
 
     Args:
         model: MuJoCo's; it is changed.
-        without: words separated by commas: one of `ALL`, kind:NAME of an actuator, loop or tendon, or what `apart`
-            has done before.
+        without: words separated by commas: one of `ALL`, kind:NAME of an actuator, loop or
+            tendon, or what `apart` has done before.
 
     Raises:
         InvalidValue: for a word that names nothing.

@@ -1,8 +1,8 @@
 """A ball in a tilted maze of concentric rings that turns about its axis.
 
-q = (theta, x, y, phi): angle of the maze, ball centre, angle of the ball; gravity acts along -y (Bortoff,
-American Modelica Conference 2020). The torque on the maze balances the ball on a ring's outer face, brings a gap under
-it, drops it to the next ring and so to the centre.
+q = (theta, x, y, phi): angle of the maze, ball centre, angle of the ball; gravity acts along -y
+(Bortoff, American Modelica Conference 2020). The torque on the maze balances the ball on a ring's
+outer face, brings a gap under it, drops it to the next ring and so to the centre.
 
 Rows, whatever the number of rings:
 
@@ -89,8 +89,8 @@ _NAMES = (
 )  # fmt: skip
 NORMAL = 6  # number of normal rows; slip rows follow them
 DISCRETE = ("channel", "sector below", "sector above", "controller")
-"""Channel i lies outside ring i - 1; a sector is the number of a gap, or -1 on solid wall; modes of the controller are
-0 off, 1 balance, 2 snatch, 3 centre."""
+"""Channel i lies outside ring i - 1; a sector is the number of a gap, or -1 on solid wall; modes
+of the controller are 0 off, 1 balance, 2 snatch, 3 centre."""
 _COORDINATES = (("maze", "rad"), ("x", "m"), ("y", "m"), ("ball", "rad"))
 
 

@@ -1,7 +1,7 @@
 """A block on a spring is dragged along by a belt: it sticks once, then slides on a sine that grazes the belt's speed.
 
-With one coefficient for sticking and sliding there is no cycle of stick and slip, and at the instants at which the
-block is as fast as the belt it must not stick (docs/explanation/contacts.md).
+With one coefficient for sticking and sliding there is no cycle of stick and slip, and at the
+instants at which the block is as fast as the belt it must not stick (docs/explanation/contacts.md).
 """
 
 from __future__ import annotations

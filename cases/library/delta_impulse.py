@@ -1,7 +1,7 @@
 """A short push on the flange of a delta robot that its motors hold against gravity.
 
-Constant torques hold the pose; a rectangular pulse J/length acts for a while. A length of 0 is the Dirac impulse that
-short pulses tend to at first order.
+Constant torques hold the pose; a rectangular pulse J/length acts for a while. A length of 0 is
+the Dirac impulse that short pulses tend to at first order.
 """
 
 from __future__ import annotations

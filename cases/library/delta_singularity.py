@@ -1,7 +1,7 @@
 """Servos bring a delta robot to the pose where its elbows coincide; a push makes the flange swing there.
 
-The motors no longer determine the flange: it is a spherical pendulum that no servo damps, while the equations of
-motion keep their rank.
+The motors no longer determine the flange: it is a spherical pendulum that no servo damps, while
+the equations of motion keep their rank.
 """
 
 from __future__ import annotations

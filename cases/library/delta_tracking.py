@@ -1,7 +1,7 @@
 """The flange of a delta robot follows a circle under sampled control with delay and encoder quantisation.
 
-Every `period` the controller reads the motor angles, rounded to the encoder's counts, and sets the torques that take
-effect `delay` samples later.
+Every `period` the controller reads the motor angles, rounded to the encoder's counts, and sets
+the torques that take effect `delay` samples later.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ SETTLED = 4.0  # horizon from which on the last third of a run shows the circle 
 def _lag(p: Mapping[str, float]) -> float:
     """Radius by which sampling and delay miss a steady circle, m: |s A/(s^3 + kd s^2 + kp s + ki)| at s = i w.
 
-    The acceleration R w^2 is commanded delay + 1/2 periods late, and damped by a rate that is half a period old: two
-    errors A at right angles to each other.
+    The acceleration R w^2 is commanded delay + 1/2 periods late, and damped by a rate that is
+    half a period old: two errors A at right angles to each other.
     """
     w = 2.0 * math.pi * p["frequency"]
     acceleration = p["radius"] * w * w

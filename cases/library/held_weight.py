@@ -1,6 +1,7 @@
 """Two fingers press on a weight from either side: it hangs by friction, or slips down between them.
 
-Both fingers push with a force F; friction bears 2 mu F. Below the weight m g it falls at g - 2 mu F/m, above it hangs.
+Both fingers push with a force F; friction bears 2 mu F. Below the weight m g it falls at g - 2 mu
+F/m, above it hangs.
 """
 
 from __future__ import annotations

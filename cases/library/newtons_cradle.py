@@ -64,8 +64,8 @@ PENDULUMS_S = 5.0
 def horizon(balls: Row, motion: Motion) -> float:
     """Long enough for sliders that collide in no time and for those whose collisions are integrated, s.
 
-    Every contact may take its contact time and its ballistic time, one after another through the whole row; and balls
-    that meet overlapping collisions leave with other speeds, so that what follows comes later.
+    Every contact may take its contact time and its ballistic time, one after another through the whole row;
+    and balls that meet overlapping collisions leave with other speeds, so that what follows comes later.
     """
     a1 = 2.0 * balls.zeta * math.sqrt(balls.a0)
     contact = cf.contact_time(balls.a0, a1) + cf.ballistic_time(balls.a0, a1)

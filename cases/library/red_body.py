@@ -1,7 +1,8 @@
 """A box falls on a slab on two feet: one corner is caught and softened, then let go by the blow of the other.
 
-Five constraints between two bodies in a plane, two sets of constants (Bortoff, American Modelica Conference
-2020): the left corner collides, is handed over to slow CONTACT constants, and is released while the right one collides.
+Five constraints between two bodies in a plane, two sets of constants (Bortoff, American Modelica
+Conference 2020): the left corner collides, is handed over to slow CONTACT constants, and is
+released while the right one collides.
 """
 
 from __future__ import annotations

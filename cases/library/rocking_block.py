@@ -1,6 +1,7 @@
 """A block that stands on an edge falls back on its base: friction keeps the edge in its place until then.
 
-An inverted pendulum in closed form (docs/explanation/contacts.md); the horizon ends just before the block is flat.
+An inverted pendulum in closed form (docs/explanation/contacts.md); the horizon ends just before
+the block is flat.
 """
 
 from __future__ import annotations

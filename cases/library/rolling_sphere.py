@@ -1,7 +1,7 @@
 """A homogeneous sphere is thrown along a floor: it slides, and then rolls.
 
-The slip of its lowest point falls at 7 mu g/2 along itself, so that a sphere with a spin goes on a parabola until it
-rolls, and straight from there (docs/explanation/contacts.md).
+The slip of its lowest point falls at 7 mu g/2 along itself, so that a sphere with a spin goes on
+a parabola until it rolls, and straight from there (docs/explanation/contacts.md).
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A block between two soft fingers: the robot feels where it is and moves to it, or pushes it.
 
-Two pads with mass, stiffness and damping close on a block that rests off the middle; touch sensors on both sides move
-the reference of the flange, x_ref' = k* (y_R - y_L), in contact and out of it alike (Bortoff, Modeling
-Contact and Collisions for Robotic Assembly Control, American Modelica Conference 2020).
+Two pads with mass, stiffness and damping close on a block that rests off the middle; touch sensors on both
+sides move the reference of the flange, x_ref' = k* (y_R - y_L), in contact and out of it alike (Bortoff,
+Modeling Contact and Collisions for Robotic Assembly Control, American Modelica Conference 2020).
 """
 
 from __future__ import annotations

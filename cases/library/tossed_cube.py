@@ -1,7 +1,7 @@
 """A cube is tossed on a table: eight corners touch it with friction, slide, hold and lift again.
 
-By default that of ContactNets (Pfrommer et al. 2020): 0.1048 m, 0.37 kg, coefficient of friction 0.18. A row is hit
-with the restitution of its law's constants, and pushes for some milliseconds.
+By default that of ContactNets (Pfrommer et al. 2020): 0.1048 m, 0.37 kg, coefficient of friction
+0.18. A row is hit with the restitution of its law's constants, and pushes for some milliseconds.
 """
 
 from __future__ import annotations

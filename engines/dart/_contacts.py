@@ -22,9 +22,9 @@ from crossbody.engines.nearest import Pose
 
 THICK, WIDE = 1.0, 40.0  # sides of the box that stands for a plane, m
 HOLDS, BOUND = 1e-3, 0.9
-"""Part of the gravity of a step by which places may slip that hold: DART's mixing of constraint forces leaves 1e-5 of
-what friction bears. And part of its bound below which friction holds: that is mu times the normal force of a problem
-without friction, from which the normal force of a box that is pushed differs."""
+"""Part of the gravity of a step by which places may slip that hold: DART's mixing of constraint forces
+leaves 1e-5 of what friction bears. And part of its bound below which friction holds: that is mu times the
+normal force of a problem without friction, from which the normal force of a box that is pushed differs."""
 LINK = 1e-12
 """Mass, of its body's, and moments of inertia, kg m^2, of what DART needs between joints and of points."""
 JOINTS = {"free": "Free", "ball": "Ball", "hinge": "Revolute", "slide": "Prismatic"}

@@ -51,8 +51,8 @@ class Rubs:
     Args:
         case: a scene with friction.
         used: settings: dt, approximation, stiction, stiffness (0: Drake's own).
-        matched: whether places of boxes, capsules and hulls over planes are points; else solids are Drake's own, of
-            which it has one contact, where they are deepest.
+        matched: whether places of boxes, capsules and hulls over planes are points; else solids
+            are Drake's own, of which it has one contact, where they are deepest.
     """
 
     def __init__(self, case: Case, used: Mapping[str, Any], matched: bool) -> None:

@@ -106,7 +106,8 @@ class Drake(Engine):
         Args:
             case: the scene.
             profile: one of `profiles`.
-            settings: matched: rtol (Drake's accuracy), scheme; continuous: rtol; default: dt, s; all: max_steps.
+            settings: matched: rtol (Drake's accuracy), scheme; continuous: rtol; default: dt, s;
+                all: max_steps.
 
         Raises:
             UnknownName, CaseUnsupported, InvalidValue: see `crossbody.engines.Engine`.

@@ -1,7 +1,7 @@
 """Bodies on a line in Drake, in two ways.
 
-As a MultibodyPlant: spheres on prismatic joints, point contact with the law's stiffness. And as a symbolic vector
-system, in which Drake evaluates the case's memoryless law without Python.
+As a MultibodyPlant: spheres on prismatic joints, point contact with the law's stiffness. And as a
+symbolic vector system, in which Drake evaluates the case's memoryless law without Python.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ THICK = 10.0  # sides of the box that stands for a plane, m
 def plant(scene: Line, dt: float) -> tuple[Any, Any]:
     """The diagram and its plant; dt is 0 for continuous time, else the step of the discrete plant, s.
 
-    A contact has the stiffness m a0 of its row; Drake's dissipation (Hunt and Crossley) is not the law's: none.
+    A contact has the stiffness m a0 of its row; Drake's dissipation (Hunt and Crossley) is not
+    the law's: none.
     """
     builder = DiagramBuilder()
     made, _ = AddMultibodyPlantSceneGraph(builder, dt)

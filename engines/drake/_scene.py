@@ -1,7 +1,8 @@
 """Any scene in a MultibodyPlant: Drake's bodies and integrators, forces of the scene at its force input.
 
-A plant in continuous time has no rows: no bounds, no loops, and contacts with a law of their own. A motion is the
-scene's until the first row would act; there a run ends and says so. One in discrete time has soft bounds.
+A plant in continuous time has no rows: no bounds, no loops, and contacts with a law of their own.
+A motion is the scene's until the first row would act; there a run ends and says so. One in
+discrete time has soft bounds.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from crossbody.engines.nearest import Pose
 
 NO_ROWS = "a MultibodyPlant in continuous time has no rows."
 FIRST = 1e-5
-"""First step of the matched profile, s: in Drake's own, .01, a force that grows with the cube of a rate may overflow
-before the error is seen."""
+"""First step of the matched profile, s: in Drake's own, .01, a force that grows with the cube of
+a rate may overflow before the error is seen."""
 SOFT = "Bounds of a MultibodyPlant in discrete time are its own springs and dampers, of which it tells no forces."
 
 

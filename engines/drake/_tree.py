@@ -3,7 +3,8 @@
     scene  free: q = (p, w x y z), v = (p', angular in body axes);  ball: q = (w x y z), v in body axes
     Drake  free: q = (w x y z, p), v = (angular, p') in world axes;  ball: roll, pitch and yaw, v in the parent's axes
 
-With v = J v_d: tau_d = J^T tau and M = J M_d J^T, for J permutes and turns. J v_d' is v': d/dt of R^T w is R^T w'.
+With v = J v_d: tau_d = J^T tau and M = J M_d J^T, for J permutes and turns. J v_d' is v': d/dt of
+R^T w is R^T w'.
 """
 
 from __future__ import annotations

@@ -42,18 +42,19 @@ PROCESS = Path(__file__).parent / "beside" / "process.py"
 class Robot(Protocol):
     """A robot file as an engine's own reader has it, in that engine's coordinates.
 
-    What the engine does not have may be left out, if `hidden` or `unseen` says why, and all that would be empty.
+    What the engine does not have may be left out, if `hidden` or `unseen` says why, and all that
+    would be empty.
 
     Attributes:
         version: of the engine.
-        joints: name, body that it moves, kind (free, ball, hinge, slide; unbounded: a hinge by cos and sin; any other
-            is compared by name alone), first position and first velocity.
+        joints: name, body that it moves, kind (free, ball, hinge, slide; unbounded: a hinge by
+            cos and sin; any other is compared by name alone), first position and first velocity.
         free, ball: conventions of their coordinates, of those in `beside.conventions.CONVENTIONS`.
         nq, nv: numbers of positions and of velocities.
         numbers: quantity (of `parts.NUMBERS`) -> joint -> one number, or one a velocity.
         actuators: which joints each moves.
-        loops: of every equality its type (connect, weld, joint; empty where the engine tells their number alone), the
-            two joints of one of joints, the coefficients of its polynomial.
+        loops: of every equality its type (connect, weld, joint; empty where the engine tells their
+            number alone), the two joints of one of joints, the coefficients of its polynomial.
         tendons: damping, stiffness, friction loss, rest and range of each.
         keys: name of every keyframe -> its positions (nq,).
         hidden: quantity -> why this engine does not have it.
@@ -168,7 +169,8 @@ class Reading:
         """Return what was measured, or `why` there is nothing; in both cases what the importer has `told`.
 
         Args:
-            job: `joints` (name, body, kind) in the order of the coordinates, and `states`, each with `q` and `v`.
+            job: `joints` (name, body, kind) in the order of the coordinates, and `states`, each
+                with `q` and `v`.
         """
         return self.answers([job])[0]
 

@@ -15,8 +15,8 @@ from crossbody.cases.scene_contacts import Contact, contacts
 POINT = 1e-15  # radius of a corner, m: below the rounding of any place, and above 0, which no ball has
 
 FAR = 100.0
-"""Half sides of the box whose face stands for a plane that moves, m: MuJoCo's planes stand still. It rounds gaps to
-1e-14 m, and has no other face within reach."""
+"""Half sides of the box whose face stands for a plane that moves, m: MuJoCo's planes stand still.
+It rounds gaps to 1e-14 m, and has no other face within reach."""
 
 LEAST = 2e-15
 """The smallest moment of inertia that MuJoCo admits, kg m^2 (twice mjMINVAL): it has no point masses."""
@@ -48,8 +48,8 @@ def without_regularisation(model: Any) -> None:
 def compiled(spec: Any, scene: Scene) -> Any:
     """Return the compiled model, with what no element of the format says.
 
-    That is where the springs of ball joints rest, the points of loops, which are computed there from the pose, and the
-    corners of meshes, which the compiler turns to its own axes in single precision.
+    That is where the springs of ball joints rest, the points of loops, which are computed there from
+    the pose, and the corners of meshes, which the compiler turns to its own axes in single precision.
     """
     model = spec.compile()
     for shape in scene.shapes:
@@ -74,7 +74,8 @@ def spec_of(scene: Scene, *, by_corners: bool = False, solids: Collection[str] =
 
     Args:
         scene: what it is made of.
-        by_corners: whether every corner of a hull is a shape of its own: MuJoCo has but a few contacts of a mesh.
+        by_corners: whether every corner of a hull is a shape of its own: MuJoCo has but a few
+            contacts of a mesh.
         solids: bodies whose mass and inertia MuJoCo takes from their shapes.
     """
     spec = mujoco.MjSpec()

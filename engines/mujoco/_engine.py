@@ -83,9 +83,9 @@ class MujocoRun(Run):
 class Mujoco(Engine):
     """MuJoCo 4; see `crossbody.engines.Engine`.
 
-    A mechanism is a module here with `default_step(case, profile)` and `build(case, profile, dt) -> Scene`; or, with a
-    machine of its own, `prepare(case, profile, used) -> Run`. It may say `why_not(case, profile)`, and have
-    `settings(case, profile)`, which `build` takes by name.
+    A mechanism is a module here with `default_step(case, profile)` and `build(case, profile, dt)
+    -> Scene`; or, with a machine of its own, `prepare(case, profile, used) -> Run`. It may say
+    `why_not(case, profile)`, and have `settings(case, profile)`, which `build` takes by name.
     """
 
     name = "mujoco"
@@ -128,8 +128,9 @@ class Mujoco(Engine):
         Args:
             case: the scene.
             profile: one of `profiles`.
-            settings: dt, time step, s; max_steps, bound on their number; reader, of a file as it stands: "file", or
-                "scene" for the model that is built from the scene, with the file's options and softness.
+            settings: dt, time step, s; max_steps, bound on their number; reader, of a file as it
+                stands: "file", or "scene" for the model that is built from the scene, with the
+                file's options and softness.
 
         Raises:
             UnknownName: for a profile or setting that does not exist.

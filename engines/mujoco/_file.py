@@ -20,9 +20,9 @@ RAISED = ("eq_solref", "jnt_solref", "tendon_solref_lim", "pair_solref", "geom_s
 def held(model: Any) -> Any:
     """Return the model with time constants of rows raised to two of the file's steps, and no more with the step.
 
-    MuJoCo raises them to two of the steps that it takes (refsafe), so that a study of steps would be one of laws too.
-    It does so to the mean of two shapes, which it is the same to do to each unless one alone is below: then the model
-    stays as it is.
+    MuJoCo raises them to two of the steps that it takes (refsafe), so that a study of steps would
+    be one of laws too. It does so to the mean of two shapes, which it is the same to do to each
+    unless one alone is below: then the model stays as it is.
     """
     off = int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
     if model.opt.disableflags & off:

@@ -64,8 +64,8 @@ class GatedRows(Rows):
     def _exerted(self) -> Floats:
         """Return the multipliers (nc,) that come nearest to what MuJoCo's contacts do to the motion.
 
-        Of the rows that are closed, or of the nearest one, and of those that follow them: H^T lam is compared with the
-        contacts' generalised force in the metric of M^-1, and none of a normal row pulls.
+        Of the rows that are closed, or of the nearest one, and of those that follow them: H^T lam is
+        compared with the contacts' generalised force in the metric of M^-1, and none of a normal row pulls.
         """
         data, lam = self.data, np.zeros(self.nc)
         if not data.ncon:

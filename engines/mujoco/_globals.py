@@ -15,8 +15,8 @@ Hook = Callable[[Any, Any], None]
 def hooked(hook: Hook | None) -> Iterator[None]:
     """Call `hook(model, data)` in every evaluation, between the rows' reference accelerations and the solver.
 
-    It sits in the slot of the control callback, which Runge-Kutta visits in every stage. Compiling a model while it
-    is set would call it too: compile before.
+    It sits in the slot of the control callback, which Runge-Kutta visits in every stage.
+    Compiling a model while it is set would call it too: compile before.
     """
     previous = mujoco.get_mjcb_control()
     mujoco.set_mjcb_control(hook)

@@ -4,13 +4,14 @@ MuJoCo differences its own time step, which must be Euler's here:
 
     v+ = v + dt a(q, v)      q+ = q + dt v+
 
-so that the lower half of the discrete matrix, less the identity and over dt, is the derivative of a: exactly, at every
-dt. Two centred differences, at eps and 2 eps, take out the error of order eps^2. The logarithm of the discrete matrix
-over dt, which is what one does who knows nothing of the step, is off by O(dt).
+so that the lower half of the discrete matrix, less the identity and over dt, is the derivative of
+a: exactly, at every dt. Two centred differences, at eps and 2 eps, take out the error of order
+eps^2. The logarithm of the discrete matrix over dt, which is what one does who knows nothing of
+the step, is off by O(dt).
 
-A row that carries little force (a light ball on a stiff face) leaves it within eps, and one that carries none (touching
-balls at rest) is at the corner of lam >= 0, where a memoryless contact has no derivative. They are pressed from outside
-by p and by 2 p: the derivative is affine in p and is extrapolated to p = 0.
+A row that carries little force (a light ball on a stiff face) leaves it within eps, and one that carries
+none (touching balls at rest) is at the corner of lam >= 0, where a memoryless contact has no derivative.
+They are pressed from outside by p and by 2 p: the derivative is affine in p and is extrapolated to p = 0.
 """
 
 from __future__ import annotations

@@ -37,8 +37,8 @@ def signs(modes: Modes, watched: Mapping[int, tuple[tuple[int, float], ...]] = W
 class Locator:
     """Finds and lands on the first instant of a step at which a row leaves its mode.
 
-    The rows keep the equations of their modes in every trial (a closed one outlives its gap), so that the end of a
-    trial is a smooth function of its length and the order of the integrator survives the event.
+    The rows keep the equations of their modes in every trial (a closed one outlives its gap), so that the
+    end of a trial is a smooth function of its length and the order of the integrator survives the event.
     """
 
     def __init__(self, scene: Scene, advance: Callable[[], None], rewind: Callable[[], None]) -> None:
@@ -59,8 +59,9 @@ class Locator:
     def land(self, modes: Modes) -> int:
         """Redo the step so that it ends just behind its first event; returns the trials that it took.
 
-        It ends behind all rows that cross together there: of those that one motion moves alike any may be the one that
-        bears. A change of constants alone (COLLISION to CONTACT) crosses nothing: it is taken at the end of the step.
+        It ends behind all rows that cross together there: of those that one motion moves alike
+        any may be the one that bears. A change of constants alone (COLLISION to CONTACT) crosses
+        nothing: it is taken at the end of the step.
         """
         crossed = self._crossed(modes)
         if not crossed:

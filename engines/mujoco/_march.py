@@ -1,7 +1,8 @@
 """Stepping: fixed steps, or the same steps cut at the events of the rows.
 
-One evaluation at the start of every step serves the record (lam belongs to that instant), the test for events and
-the integrator's first stage: mj_forward, then the integrator alone, instead of mj_step, which would evaluate twice.
+One evaluation at the start of every step serves the record (lam belongs to that instant), the
+test for events and the integrator's first stage: mj_forward, then the integrator alone, instead
+of mj_step, which would evaluate twice.
 """
 
 from __future__ import annotations

@@ -18,13 +18,14 @@ from crossbody.engines.mujoco._rows import Rows
 from crossbody.engines.mujoco._rubs import EDGES
 
 USUAL = 1e4
-"""Stiffness over mass of bodies that collide with each other, 1/s^2: about the largest that a step of 2 ms resolves.
-MuJoCo's own constants (solref 0.02 1) would have them stick together."""
+"""Stiffness over mass of bodies that collide with each other, 1/s^2: about the largest that a
+step of 2 ms resolves. MuJoCo's own constants (solref 0.02 1) would have them stick together."""
 SMALL, SLIGHT = 1e-12, 1e-8
 """Gap that rounding may make of bodies that touch, m or rad; acceleration of the heaviest that its push is then."""
 LOCKED = 1e-3
-"""Inertia of a joint amid all, over their mean, below which one is so heavy that it stands still. The tolerance of
-MuJoCo's solver is relative to the mean: beside 1e6 kg m^2 it would never start, and is relative to that amid all."""
+"""Inertia of a joint amid all, over their mean, below which one is so heavy that it stands still.
+The tolerance of MuJoCo's solver is relative to the mean: beside 1e6 kg m^2 it would never start,
+and is relative to that amid all."""
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 
 

@@ -34,9 +34,12 @@ class Rows:
 
     Attributes:
         always: number of rows that are always on; they stand first in both.
-        steady: whether what MuJoCo has rows for says which these are: no bound has two ends, no pair two places.
-        frictional: whether edges of friction pyramids, whose sum is the normal force, are rows of contacts too.
-        contacts: where the normal rows of contacts stand; behind them are the tangential ones of those with friction.
+        steady: whether what MuJoCo has rows for says which these are: no bound has two ends, no
+            pair two places.
+        frictional: whether edges of friction pyramids, whose sum is the normal force, are rows of
+            contacts too.
+        contacts: where the normal rows of contacts stand; behind them are the tangential ones of
+            those with friction.
         rubs: contacts with friction; rubbing: whether there are any.
         dry: rows of dry friction, which stand last, by what MuJoCo calls them.
     """

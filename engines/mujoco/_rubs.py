@@ -27,7 +27,8 @@ class Rub:
         row: its normal row.
         normal: force, N.
         across (2,): force on the second shape along its tangential rows, N.
-        slides: whether friction is at the bound that the model has: of the pyramid along its own axes, or of the cone.
+        slides: whether friction is at the bound that the model has: of the pyramid along its own
+            axes, or of the cone.
     """
 
     row: int

@@ -25,7 +25,8 @@ def _nothing(_t: float) -> None:
 class Scene:
     """A compiled model with views and closures on it.
 
-    The closures read `data` after mj_forward and are called every step: they touch only views made beforehand.
+    The closures read `data` after mj_forward and are called every step: they touch only views
+    made beforehand.
 
     Attributes:
         model, data: MjModel, MjData.
@@ -38,13 +39,16 @@ class Scene:
         instants: when the inputs change, s, increasing.
         change: puts in force what acts from such an instant on.
         acting: what acts on a case's scene from outside, controllers included; None elsewhere.
-        hook: adds to efc_aref what solref cannot say, and sets forces that depend on the state; None if nothing.
+        hook: adds to efc_aref what solref cannot say, and sets forces that depend on the state;
+            None if nothing.
         always: whether the hook acts while all rows are free too.
         arm: opens and closes rows to suit their modes (matched profile only).
-        margins: -> for every row its gap, m, and the sign of the multiplier that it would have without the bound
-            lam >= 0 (matched profile only).
-        entered: modes of rows that push or not -> those of rows with two sets of constants, which collide first.
-        outlives: whether a row that pushes stays on above its surface until it no longer does, as the law has it.
+        margins: -> for every row its gap, m, and the sign of the multiplier that it would have
+            without the bound lam >= 0 (matched profile only).
+        entered: modes of rows that push or not -> those of rows with two sets of constants, which
+            collide first.
+        outlives: whether a row that pushes stays on above its surface until it no longer does, as
+            the law has it.
         lost: -> why the motion has ended, as the case's own switch says; empty while it goes on.
         follows: index of the row whose mode each one shares; empty where none does.
         switches: changes of the case's discrete variables, in order.

@@ -1,7 +1,8 @@
 """Rows of the matched profile: on or off as their modes say, so that a step can be cut where one of them changes.
 
-MuJoCo has a row for a bound or a contact where it is closer than its margin. One that is on keeps a wide margin and its
-law, one that is off never pushes: the end of a trial is then a smooth function of its length.
+MuJoCo has a row for a bound or a contact where it is closer than its margin. One that is on keeps
+a wide margin and its law, one that is off never pushes: the end of a trial is then a smooth
+function of its length.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from crossbody.engines.mujoco._observe import constraint_jacobian
 from crossbody.engines.mujoco._rows import LIMITS, Present, Rows
 
 REACH = 1e-12
-"""How far above its surface a row is closed, m or rad: one at rest, or one that starts at its surface, is there but for
-rounding."""
+"""How far above its surface a row is closed, m or rad: one at rest, or one that starts at its
+surface, is there but for rounding."""
 WIDE = 0.1  # how far above its surface a row that is on is still a row, m or rad: further than a step goes
 FAR = 1e9  # margin with which there is a row at any gap, m or rad
 OFF = -1e12  # reference acceleration of a row that is off, m/s^2
@@ -41,20 +42,23 @@ BILATERAL, COLLISION, SEPARATED = int(Mode.BILATERAL), int(Mode.COLLISION), int(
 class Switched(Rows):
     """Rows that open and close by their modes.
 
-    A row with two sets of constants collides with the fast ones and is handed over to the slow ones at the end of the
-    step in which the elastic part of its multiplier is spent.
+    A row with two sets of constants collides with the fast ones and is handed over to the slow
+    ones at the end of the step in which the elastic part of its multiplier is spent.
 
     Attributes:
         armed: the modes that are in force. on (nc,): which rows have their law, those in contact.
         part: of every row that may open the array of margins and its place there.
-        sets: of every row with two sets of constants its array of them and its place there, the slow and the fast ones.
+        sets: of every row with two sets of constants its array of them and its place there, the
+            slow and the fast ones.
         surface (nc,): margin at which its law has it at zero, m or rad.
         wanted (nc,): reference acceleration by the law, m/s^2 or rad/s^2.
         quiet: whether all rows that open are bounds, whose gaps are known without a row: free ones have none.
-        converged: where Newton's method may end while no row that opens is there; with one it goes on while it can.
-        last (nc,): multipliers at the end of the last step. J v' = a - R f, where MuJoCo keeps a softness R; with
-            a + R f of the last step in the place of a, what is left of it is R times the change of f in a step. It is 0
-            of contacts, whose R is 1e-11 of what moves them: less than what solving anew for another f makes of it.
+        converged: where Newton's method may end while no row that opens is there; with one it
+            goes on while it can.
+        last (nc,): multipliers at the end of the last step. J v' = a - R f, where MuJoCo keeps a
+            softness R; with a + R f of the last step in the place of a, what is left of it is R
+            times the change of f in a step. It is 0 of contacts, whose R is 1e-11 of what moves
+            them: less than what solving anew for another f makes of it.
     """
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:

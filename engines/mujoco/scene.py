@@ -40,18 +40,21 @@ from crossbody.engines.mujoco._switched import Switched
 CONE = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}
 FASTEST = 100.0  # times the speed that a scene can have: a run has diverged
 SLOWEST, OF_RATE, OF_ROWS = 1e-3, 0.02, 0.05
-"""Largest step of the matched profile, s, and the parts that it is of the fastest time constant of forces and of that
-of rows that open: Runge-Kutta 4 leaves (1/50)^4 a time constant, and rows act for a few of theirs."""
+"""Largest step of the matched profile, s, and the parts that it is of the fastest time constant
+of forces and of that of rows that open: Runge-Kutta 4 leaves (1/50)^4 a time constant, and rows
+act for a few of theirs."""
 STABLE, DECAYS = 0.5, 0.5
-"""Largest product of the step and any rate, where Runge-Kutta 4 is stable up to 2.8 and rates change as bodies turn;
-and part of a rate by which a mode may swing at most that only decays."""
+"""Largest product of the step and any rate, where Runge-Kutta 4 is stable up to 2.8 and rates
+change as bodies turn; and part of a rate by which a mode may swing at most that only decays."""
 CONVERGED = 1e-28
-"""Improvement at which Newton's method ends where no row may let go: its costs are quadratic then, it is there after
-two or three iterations, and without an end it takes a hundred. Where rows may, rounding that is left over lets them."""
+"""Improvement at which Newton's method ends where no row may let go: its costs are quadratic
+then, it is there after two or three iterations, and without an end it takes a hundred. Where rows
+may, rounding that is left over lets them."""
 STIFF = 1e3
-"""Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of MuJoCo's. Newton's
-method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7 leaves multipliers of bounds off by
-1e-3, 1e-4 by 1e-6 (`tests/reference/test_bounds_at_rest.py`). Loops in space bear many times what moves: 1e-7."""
+"""Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of
+MuJoCo's. Newton's method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7
+leaves multipliers of bounds off by 1e-3, 1e-4 by 1e-6 (`tests/reference/test_bounds_at_rest.py`).
+Loops in space bear many times what moves: 1e-7."""
 ROUNDS = 3  # of PGS, with one row
 SOLVES = 4
 """Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
@@ -141,8 +144,9 @@ def _reach(case: Case, rows: Switched) -> tuple[float, float]:
 def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     """Return the rate, 1/s, that a step has to follow of how springs, dampers and actuators move bodies from a state.
 
-    Loops hold. Runge-Kutta 4 leaves about (h rate)^4 of what a mode moves. One that swings moves as much as all; one
-    that decays by what a unit position or a unit rate makes of it, 1/rate where a damper alone holds a light body.
+    Loops hold. Runge-Kutta 4 leaves about (h rate)^4 of what a mode moves. One that swings moves
+    as much as all; one that decays by what a unit position or a unit rate makes of it, 1/rate
+    where a damper alone holds a light body.
     """
     A = _slopes(scene, q, v)
     n = len(A) // 2
@@ -286,7 +290,8 @@ _READ: list[tuple[Case, Any]] = []
 def matched(scene: Scene) -> Any:
     """Return the model built from the scene: its own law, no regularisation, Runge-Kutta 4, no other contacts.
 
-    Controls stand for the activations of actuators that have one: MuJoCo's stages let these pass the ends of ranges.
+    Controls stand for the activations of actuators that have one: MuJoCo's stages let these pass
+    the ends of ranges.
     """
     scene = scene.replace(actuators=tuple(
         replace(one, activation="", time_constant=0.0, control_range=UNBOUNDED) if one.activation else one

@@ -4,7 +4,8 @@ v+ = v + M^-1 ( dt (tau - b) + J^T p )        q+ = q + dt (theta v+ + (1 - theta
 0 <= p  perp  J v+ + e J v >= 0               rows whose gap is closed half a step ahead (Moreau and Jean)
 (1 + a1 dt + k dt^2) J v+ = J v - k dt h      rows that are always on: implicit Euler of the law, k = a0 + a2 h^2
 
-theta = 1/2, exact in free flight; 1 if a row is always on, or its position would not follow its own condition.
+theta = 1/2, exact in free flight; 1 if a row is always on, or its position would not follow its
+own condition.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 v+ = v + M^-1 (dt (tau - b) + J^T p)        p in the cones, J v+ + (0, 0, e J_n v) in their duals (de Saxce)
 
-A place takes part where its gap is closed half a step ahead (Moreau and Jean); restitution is Newton's, and positions
-go with the mean of both velocities.
+A place takes part where its gap is closed half a step ahead (Moreau and Jean); restitution is
+Newton's, and positions go with the mean of both velocities.
 """
 
 from __future__ import annotations
@@ -186,7 +186,8 @@ class Cones:
 def _solved(p: Floats, w: Floats, mu: Floats) -> bool:
     """Return whether impulses (k, 3) and velocities behind them (k, 3) obey Coulomb's law, by the natural map.
 
-    p is the projection of p - r (w + mu |w_t| n) on its cone, for any r > 0; r is what brings both to one size.
+    p is the projection of p - r (w + mu |w_t| n) on its cone, for any r > 0; r is what brings
+    both to one size.
     """
     pushed = w.copy()
     pushed[:, 2] += mu * np.linalg.norm(w[:, :2], axis=1)

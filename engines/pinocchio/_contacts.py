@@ -22,7 +22,8 @@ class ContactRows:
 
     Attributes:
         count: number of rows.
-        along: of contacts whose shapes may lie along each other, whether these do; as they lie where it says nothing.
+        along: of contacts whose shapes may lie along each other, whether these do; as they lie
+            where it says nothing.
     """
 
     def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:
@@ -163,11 +164,12 @@ def contact_rows(scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]
 class Points:
     """Rows as Pinocchio's constraints of three components, the normal last, at positions q.
 
-    A contact is a point without friction between its shapes. A coordinate that is held is an anchor where it has its
-    value, whose other components the joint keeps anyway.
+    A contact is a point without friction between its shapes. A coordinate that is held is an
+    anchor where it has its value, whose other components the joint keeps anyway.
 
     Attributes:
-        steady: whether M and the constraints' Jacobians are the same everywhere: where all slides, and no normal turns.
+        steady: whether M and the constraints' Jacobians are the same everywhere: where all
+            slides, and no normal turns.
     """
 
     def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]], straight: bool) -> None:

@@ -3,8 +3,9 @@
     scene      free: q = (p, w x y z), v = (p', angular in body axes);            ball: q = (w x y z), v in body axes
     Pinocchio  free: q = (p, x y z w), v = (R^T p', angular), both in body axes;  ball: q = (x y z w), v in body axes
 
-With v = J v_e: tau_e = J^T tau, M_e = J^T M J, b_e = J^T (b + M J' v_e). J is R on the linear velocity of a free joint
-and 1 elsewhere; there J' v_e = R (w x v_lin), and 0 elsewhere. Slides and hinges count from their reference.
+With v = J v_e: tau_e = J^T tau, M_e = J^T M J, b_e = J^T (b + M J' v_e). J is R on the linear
+velocity of a free joint and 1 elsewhere; there J' v_e = R (w x v_lin), and 0 elsewhere. Slides
+and hinges count from their reference.
 """
 
 from __future__ import annotations

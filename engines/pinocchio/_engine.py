@@ -41,8 +41,9 @@ METHOD_OF_STIFF = replace(
     METHOD, default=AUTO, doc="that, or auto: which goes further by a right-hand side", choices=(AUTO, *METHODS)
 )
 OF_GATES = replace(RTOL, default=1e-12), replace(METHOD, default="BDF")
-"""A ball that rests on a face is stiff; and what a switch latches of a place, as the angle that a controller goes to,
-stays off by the error that it had: of 1e-10 three microseconds are left after a minute in the maze."""
+"""A ball that rests on a face is stiff; and what a switch latches of a place, as the angle that a
+controller goes to, stays off by the error that it had: of 1e-10 three microseconds are left after
+a minute in the maze."""
 TRIED = 250
 """Steps by which the methods are compared: their start, at order 1, takes less than half of them."""
 SOLVER = Parameter(default="forwardDynamics", doc="how v' and lam are solved for", choices=tuple(ALGEBRA))
@@ -88,8 +89,8 @@ class PinocchioRun(Run):
 class Pinocchio(Engine):
     """Pinocchio 4; see `crossbody.engines.Engine`.
 
-    A mechanism is a module here with `build(case, algebra) -> Scene`; or, with a machine of its own, `SETTINGS`,
-    `why_not(case, profile)` and `prepare(case, used) -> Run`.
+    A mechanism is a module here with `build(case, algebra) -> Scene`; or, with a machine of its
+    own, `SETTINGS`, `why_not(case, profile)` and `prepare(case, used) -> Run`.
     """
 
     name = "pinocchio"

@@ -230,8 +230,8 @@ class Flow:
     def _passed_over(self, t: float, before: Floats, step: Any, fired: Fired) -> float | None:
         """When in a step a free row was at its lowest whose touch was not found; None if there is none.
 
-        It stands below its surface at the end, or it turned twice in between: up, down and up again has the same signs
-        at both ends. What falls freely takes steps as long as that.
+        It stands below its surface at the end, or it turned twice in between: up, down and up
+        again has the same signs at both ends. What falls freely takes steps as long as that.
         """
         if Mode.FREE not in self.modes:
             return None

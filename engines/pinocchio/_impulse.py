@@ -185,8 +185,9 @@ RULES: dict[str, Impact] = {"impulse": sequential, "impulse_simultaneous": simul
 class ImpulseMachine:
     """Rows are FREE or, once captured, held rigidly (CONTACT) until they would have to pull.
 
-    A struck row passes through COLLISION within the instant. The rule strikes until no touching row approaches.
-    One run uses one machine: it remembers the largest rates and accelerations that it saw, and which gaps are closed.
+    A struck row passes through COLLISION within the instant. The rule strikes until no touching
+    row approaches. One run uses one machine: it remembers the largest rates and accelerations
+    that it saw, and which gaps are closed.
     """
 
     def __init__(self, rows: PinRows, a0: list[float], e: list[float], rule: Impact = sequential) -> None:

@@ -1,7 +1,8 @@
 """Points, and axes, of two bodies that meet or stay within a distance, by Pinocchio's own kinematics; dependent rows.
 
-Points: h = x1 - x2, H = J1 - J2, H' v = their accelerations at v' = 0. Axes: with the quaternion (e0, e) of R2' R1 and
-A = s/2 (e0 1 - [e]x) R2', h = s e, H = A (J1 - J2) of the angular velocities w1, w2, and at v' = 0
+Points: h = x1 - x2, H = J1 - J2, H' v = their accelerations at v' = 0. Axes: with the quaternion
+(e0, e) of R2' R1 and A = s/2 (e0 1 - [e]x) R2', h = s e, H = A (J1 - J2) of the angular
+velocities w1, w2, and at v' = 0
 
     H' v = A (w1' - w2' - w2 x w1) - s/4 |w1 - w2|^2 e
 """
@@ -257,8 +258,9 @@ def _end(model: Any, placed: tuple[int, Any], position: Any, orientation: Any) -
 def loose_rows(A: Floats, widths: Sequence[int], rank: int) -> tuple[list[int], float]:
     """Return which rows of loops are left out, and the singular value over the largest that counts as zero.
 
-    By Gram and Schmidt, each time the row that is longest behind those before it: what is nearly dependent is left out
-    (what follows but for rounding is not: the least norm deals with it), or all that is beyond a rank.
+    By Gram and Schmidt, each time the row that is longest behind those before it: what is nearly
+    dependent is left out (what follows but for rounding is not: the least norm deals with it), or
+    all that is beyond a rank.
 
     Args:
         A: H M^-1/2 of the loops (rows, nv) where they are closed.

@@ -4,9 +4,9 @@ At an equilibrium the accelerations a and the multipliers lam of the rows that a
 
     rnea(q, v, a) - tau(q, v) - H(q)^T lam = 0        H(q) a + gamma(q, v) = 0
 
-with gamma = H' v + a1 h' + a0 h + a2 h^3. `computeRNEADerivatives` gives the derivative of rnea at fixed a,
-`computeABADerivatives` that of a where no row is on. What Pinocchio does not know, the forces tau and the geometry of
-the rows, is differenced centrally to fourth order.
+with gamma = H' v + a1 h' + a0 h + a2 h^3. `computeRNEADerivatives` gives the derivative of rnea
+at fixed a, `computeABADerivatives` that of a where no row is on. What Pinocchio does not know,
+the forces tau and the geometry of the rows, is differenced centrally to fourth order.
 """
 
 from __future__ import annotations

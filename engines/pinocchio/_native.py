@@ -61,7 +61,8 @@ class Native:
     def turned(self, q: Floats, lam: Floats, M: Floats, H: Floats) -> Floats:
         """Return what `derivatives` has too much in v' (nv, 2 nv): found from its residual, exact to rounding.
 
-        It is M v' - H^T lam of the second bodies, in the column of the first joint: J^T (-nv e x lam), e its axis.
+        It is M v' - H^T lam of the second bodies, in the column of the first joint: J^T (-nv e x
+        lam), e its axis.
         """
         model, data, nv = self.model, self.data, self.model.nv
         pin.computeJointJacobians(model, data, q)
@@ -78,8 +79,8 @@ class Native:
 def apt(scene: Scene, law: Law, A: Floats) -> bool:
     """Return whether points that stay together, under a linear law, are the only rows of a scene, and surely hold.
 
-    An iteration of the proximal solver leaves mu / (mu + s^2) of the error of a row, s^2 its part of H M^-1 H^T over
-    the largest: one that nearly depends on others would be left behind its law.
+    An iteration of the proximal solver leaves mu / (mu + s^2) of the error of a row, s^2 its part
+    of H M^-1 H^T over the largest: one that nearly depends on others would be left behind its law.
 
     Args:
         scene: with its loops.

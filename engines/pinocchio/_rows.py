@@ -100,15 +100,16 @@ class PinRows:
         jacobian: q -> H (nc, nv).
         heights: q -> h (nc,), m.
         drift: (q, v) -> H' v (nc,), m/s^2.
-        drift_of, gradient_of: (q, v, rows) -> that of some rows, and (q, rows) -> their h and H; given where these cost
-            less than those of all.
+        drift_of, gradient_of: (q, v, rows) -> that of some rows, and (q, rows) -> their h and H;
+            given where these cost less than those of all.
         law: constants of every row.
         near: as of `crossbody.engines._machines.Rows`.
         follows: index of the row whose mode each one shares; -1 for none.
-        ways: how pairs of shapes lie to each other that may in two ways, or discrete variables that say which rows
-            can be touched; None where there is none.
+        ways: how pairs of shapes lie to each other that may in two ways, or discrete variables
+            that say which rows can be touched; None where there is none.
         native: the rows as Pinocchio's own constraints, where none ever opens; None elsewhere.
-        shared: what makes multipliers of rows that depend on each other such that none pulls; None where rows do not.
+        shared: what makes multipliers of rows that depend on each other such that none pulls;
+            None where rows do not.
     """
 
     def __init__(

@@ -52,8 +52,8 @@ class Scene:
         rows: gaps, accelerations and multipliers.
         points: rows as Pinocchio's constraints (profile admm); None where no contact can be stepped.
         observe: gaps and energies of many states of the model.
-        sizes: how far the coordinates move (or how deep contacts give), and how fast: numbers, or one a coordinate
-            (n,). Times rtol they are the absolute tolerances.
+        sizes: how far the coordinates move (or how deep contacts give), and how fast: numbers, or
+            one a coordinate (n,). Times rtol they are the absolute tolerances.
         start: q and v at the start in the engine's coordinates; None where they are the case's.
         chart: positions and velocities of the engine -> those of the case; None where they are the same.
         world: what acts from outside.

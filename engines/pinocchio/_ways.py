@@ -1,7 +1,8 @@
 """How capsules lie to each other, and how cylinders stand, while they touch: held between instants that are located.
 
-The rows of such a pair are others as it lies along and as it is crossed. While one of them is in force the way holds;
-where the shapes come to lie the other way is an event, at which what touched goes over to the places that are nearest.
+The rows of such a pair are others as it lies along and as it is crossed. While one of them is in
+force the way holds; where the shapes come to lie the other way is an event, at which what touched
+goes over to the places that are nearest.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ class Ways:
         forget: of answers that were kept for rows as they were.
 
     Attributes:
-        watched: number of functions that are watched, two a pair: until it lies the other way, and until it has turned
-            through, inside one step, a way in which it did not seem to lie at the ends.
+        watched: number of functions that are watched, two a pair: until it lies the other way, and until
+            it has turned through, inside one step, a way in which it did not seem to lie at the ends.
     """
 
     def __init__(self, touching: ContactRows, first: int, forget: Callable[[], None]) -> None:

@@ -46,8 +46,8 @@ SMALL = 1e-4
 a pendulum that is let go upright moves by less for a while, and by all of it later."""
 RESTS = 1e-12  # gap and rate, SI, at which a row rests at the start
 DIPS = 0.02
-"""m: shapes further apart are not looked at for dips that begin and end in one step; a robot has hundreds of pairs,
-every one of which would have steps end where it is nearest."""
+"""m: shapes further apart are not looked at for dips that begin and end in one step; a robot has
+hundreds of pairs, every one of which would have steps end where it is nearest."""
 Heights = Callable[[Floats], Floats]
 Gradients = tuple[Floats, Floats]  # h (n,) and H (n, nv)
 Placed = dict[str, tuple[int, Any]]  # body -> joint that carries it, and its pose in that joint's frame
@@ -187,7 +187,8 @@ def _given_sizes(case: Case, to: Coordinates) -> tuple[Floats, Floats] | None:
 def _sizes(rows: PinRows, q: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Return how far coordinates move while a row is closed (nq,), and how fast (nv,), by what the start drives.
 
-    Rows that rest on their surfaces hold what stands on them: a body that falls does so over one that does not.
+    Rows that rest on their surfaces hold what stands on them: a body that falls does so over one
+    that does not.
     """
     h, H = rows.gradient_of(q, slice(None))
     rests = (np.abs(h) <= RESTS) & (np.abs(H @ v) <= RESTS)
@@ -310,9 +311,9 @@ class Gaps:
 def _may_depend(scene: Scene, gaps: Gaps) -> bool:
     """Return whether rows that act at once may depend on each other; bounds of joints alone do not.
 
-    Planar loops have rows that do, joints that are coupled and both at their bounds, and bodies on many feet. Where H
-    is the same everywhere, it tells. Distances do not where bodies that move apart from each other make no ring of
-    them: the last of a chain moves by coordinates of its own.
+    Planar loops have rows that do, joints that are coupled and both at their bounds, and bodies on
+    many feet. Where H is the same everywhere, it tells. Distances do not where bodies that move
+    apart from each other make no ring of them: the last of a chain moves by coordinates of its own.
     """
     H, touching = gaps.rows.straight, gaps.touching.count
     if gaps.steady and np.linalg.matrix_rank(H) == len(H):

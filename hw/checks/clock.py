@@ -43,8 +43,8 @@ class First:
 class ClockCheck:
     """The clock of a log, seen block by block.
 
-    Residuals e_k = t_k - t_0 - k T of the sample with index k (dropped samples counted) give the drift as their slope
-    and the jitter as their scatter about it.
+    Residuals e_k = t_k - t_0 - k T of the sample with index k (dropped samples counted) give the
+    drift as their slope and the jitter as their scatter about it.
 
     Args:
         nominal: sample time T, s; the median step of the first block if None.

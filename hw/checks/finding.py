@@ -15,8 +15,8 @@ class Finding:
     """One doubt about a log, with the place of its first offence.
 
     Attributes:
-        check: name of the check: "samples", "time", "finite", "range", "rates", "sample_time", "dropped", "jitter",
-            "drift", "stuck", "saturated", "wraps", "slips", "spikes", "unit", "gain", "delay".
+        check: name of the check: "samples", "time", "finite", "range", "rates", "sample_time", "dropped",
+            "jitter", "drift", "stuck", "saturated", "wraps", "slips", "spikes", "unit", "gain", "delay".
         fault: True if the log cannot be used so; False for what one should know.
         channel: `role.name` of the channel, or "time".
         row: row of the file, counted from 0.

@@ -58,10 +58,11 @@ def find_jumps(
 ) -> tuple[Jumps, float]:
     """Find the steps that stand out of their two neighbours on either side.
 
-    A smooth motion's step lies between its neighbours, but for its third difference; so it does where an impact changes
-    the velocity. A slip is a step far outside, of one sample or of some, a wrap one that fits when whole turns are
-    taken off, and a spike a sample or two that leave the line of those around them. Wherever one is, the second
-    difference of the steps is larger than the noise admits: the rest of the samples is not looked at.
+    A smooth motion's step lies between its neighbours, but for its third difference; so it does
+    where an impact changes the velocity. A slip is a step far outside, of one sample or of some,
+    a wrap one that fits when whole turns are taken off, and a spike a sample or two that leave
+    the line of those around them. Wherever one is, the second difference of the steps is larger
+    than the noise admits: the rest of the samples is not looked at.
 
     Args:
         times (n,): s, finite.

@@ -50,10 +50,10 @@ def _usual(spans: Floats) -> NDArray[np.bool_]:
 class RateCheck:
     """Compares the change of a coordinate over 16 samples with the integral of its velocity (trapezoids).
 
-    Over all spans, the least-squares gain g of dq = g (integral of v) and their correlation tell whether they belong
-    together. Where they do, dq = g (integral of v) + d (change of v) tells by how much the gain is off, and by which
-    time d the velocity is late; where the coordinate less the integral jumps by more than both, it has slipped. A span
-    with a dropped sample or an impact does no harm: it is one of many.
+    Over all spans, the least-squares gain g of dq = g (integral of v) and their correlation tell whether
+    they belong together. Where they do, dq = g (integral of v) + d (change of v) tells by how much the gain
+    is off, and by which time d the velocity is late; where the coordinate less the integral jumps by more
+    than both, it has slipped. A span with a dropped sample or an impact does no harm: it is one of many.
 
     Args:
         name: the coordinate's name.
@@ -205,9 +205,9 @@ class RateCheck:
     def _about_bias(self, fault: bool) -> list[Finding]:
         """A rate that is off by a constant, and belongs to its coordinate without that.
 
-        The integral of the rate is more than the whole change of the coordinate by the bias times the time. A gain or
-        a delay that is within its limits leaves at most a part of the way; noise leaves the scatter of the spans,
-        which are taken for an autoregressive series of first order.
+        The integral of the rate is more than the whole change of the coordinate by the bias times
+        the time. A gain or a delay that is within its limits leaves at most a part of the way; noise
+        leaves the scatter of the spans, which are taken for an autoregressive series of first order.
         """
         (dq, iv, way, length), n = self._totals, self._n
         if n < FEWEST or not length > 0.0:

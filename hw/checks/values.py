@@ -88,7 +88,8 @@ class Run(First):
 
     Attributes:
         value: what they are.
-        sharp: how far in the 10 samples before, if that is no part of a smooth motion that came to rest; 0 if it is.
+        sharp: how far in the 10 samples before, if that is no part of a smooth motion that came
+            to rest; 0 if it is.
         left: by how much the first step after leaves that value.
     """
 
@@ -100,11 +101,13 @@ class Run(First):
 class Runs:
     """Runs of equal values across blocks that no rest explains.
 
-    Kept are the longest, the one that ended with the largest jump, and the longest at either end of the values so far.
+    Kept are the longest, the one that ended with the largest jump, and the longest at either end
+    of the values so far.
 
-    Rests and turning points are runs too, on the grid of an encoder. They are told from a channel that froze or hit
-    its limit by how the run begins: a motion that comes to rest covers 1/25 of its last 50 samples' way in the last 10,
-    one that is cut off a fifth. It must be more than the grid explains, so that a run is judged at the end alone.
+    Rests and turning points are runs too, on the grid of an encoder. They are told from a channel
+    that froze or hit its limit by how the run begins: a motion that comes to rest covers 1/25 of
+    its last 50 samples' way in the last 10, one that is cut off a fifth. It must be more than the
+    grid explains, so that a run is judged at the end alone.
     """
 
     def __init__(self) -> None:

@@ -1,8 +1,9 @@
 """Do disjoint stretches of the data tell the same? Each half's own estimate, to first order about the common one.
 
-A Gauss-Newton step on one half of the residuals, x + J_h^+ r_h, is that half's estimate where the model is near enough
-to linear over the step. Two halves of independent noise differ by more than their standard deviations explain only if
-the model is not the same in both: what it lacks then moves its parameters, and no interval covers that.
+A Gauss-Newton step on one half of the residuals, x + J_h^+ r_h, is that half's estimate where the
+model is near enough to linear over the step. Two halves of independent noise differ by more than
+their standard deviations explain only if the model is not the same in both: what it lacks then
+moves its parameters, and no interval covers that.
 """
 
 from __future__ import annotations

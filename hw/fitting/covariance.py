@@ -1,17 +1,18 @@
 """Covariance of least-squares estimates from residuals that may be correlated in time and between channels.
 
-White residuals have the covariance sum_c s_c^2 L_c L_c^T, L = (J^T J)^-1 J^T, with a noise s_c of every channel. For
-others the variance of an estimate l^T r is found from its own contributions: the parts l_j^T r with l_j = l f_j(t) on
-one window, f_j cosines over it (of order 0 alone: the windows' own scores, Liang and Zeger 1986; several: the
-orthonormal series of Lazarus, Lewis, Stock and Watson 2018, which needs no bandwidth). A fit makes residuals smaller
-and less correlated than the noise; what that takes from the mean of the parts, and how many independent parts they are
-worth, follows from a working covariance V of the noise (Bell and McCaffrey 2002): with a_j = (I - Q Q^T) l_j and
-A = a^T V a,
+White residuals have the covariance sum_c s_c^2 L_c L_c^T, L = (J^T J)^-1 J^T, with a noise s_c of every
+channel. For others the variance of an estimate l^T r is found from its own contributions: the parts
+l_j^T r with l_j = l f_j(t) on one window, f_j cosines over it (of order 0 alone: the windows' own
+scores, Liang and Zeger 1986; several: the orthonormal series of Lazarus, Lewis, Stock and Watson 2018,
+which needs no bandwidth). A fit makes residuals smaller and less correlated than the noise; what that
+takes from the mean of the parts, and how many independent parts they are worth, follows from a working
+covariance V of the noise (Bell and McCaffrey 2002): with a_j = (I - Q Q^T) l_j and A = a^T V a,
 
     var = mean (l_j^T r)^2  l^T V l / mean A_jj,    degrees of freedom = (sum A_jj)^2 / sum A_jk^2.
 
-V is a first-order autoregression with the lag-1 correlation of which the fit leaves the observed one in the mean. Where
-it is right the variance is unbiased; where it is not, the parts still tell the variance at low frequencies.
+V is a first-order autoregression with the lag-1 correlation of which the fit leaves the observed
+one in the mean. Where it is right the variance is unbiased; where it is not, the parts still tell
+the variance at low frequencies.
 """
 
 from __future__ import annotations
@@ -116,8 +117,8 @@ def scatter(Q: Floats, L: Floats, residual: Floats, layout: Layout) -> Scatter:
 def whiteness(Q: Floats, residual: Floats, layout: Layout) -> float:
     """Probability of correlations at least as large if the noise is white, the lower of lag 1 and of all lags, doubled.
 
-    Correlations are pooled over all windows, so that short ones count too; what white noise of this fit has in the mean
-    is taken off.
+    Correlations are pooled over all windows, so that short ones count too; what white noise of
+    this fit has in the mean is taken off.
     """
     if not np.any(residual):
         return 1.0

@@ -1,8 +1,8 @@
 """Residuals of a replay and their derivatives by what is to be identified: exact, by complex step through the motion.
 
-A run of the kernels from x + i s e_k carries d/dx_k in its imaginary part (s = 1e-30, Squire and Trapp 1998):
-parameters, the start that follows from them through the closed rows, and the start itself. The delay acts by y(t - d),
-whose derivative is -y'(t - d).
+A run of the kernels from x + i s e_k carries d/dx_k in its imaginary part (s = 1e-30, Squire and
+Trapp 1998): parameters, the start that follows from them through the closed rows, and the start
+itself. The delay acts by y(t - d), whose derivative is -y'(t - d).
 """
 
 from __future__ import annotations

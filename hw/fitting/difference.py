@@ -1,7 +1,7 @@
 """Residuals of a replay and their derivatives by central differences, for models whose contacts open and close.
 
-A motion with contacts is no smooth function of its parameters: the step must be large beside the jumps that a shifted
-touch makes, and the derivative at half the step tells how far it can be trusted.
+A motion with contacts is no smooth function of its parameters: the step must be large beside the
+jumps that a shifted touch makes, and the derivative at half the step tells how far it can be trusted.
 """
 
 from __future__ import annotations
@@ -78,10 +78,10 @@ class Differences:
     def flat(self, x: Floats) -> dict[int, str]:
         """Parameters that half or double their value hardly worsens: index -> that in words.
 
-        A value is worse if the sums of squares of the windows are larger by more than their scatter explains (one-sided
-        t test at 97.5 %), or all together by more than one parameter of as many observations as there are windows does
-        (an F test: what a single window tells, others need not). Local derivatives of such a motion say less: they feel
-        single touches that shift.
+        A value is worse if the sums of squares of the windows are larger by more than their scatter
+        explains (one-sided t test at 97.5 %), or all together by more than one parameter of as many
+        observations as there are windows does (an F test: what a single window tells, others need
+        not). Local derivatives of such a motion say less: they feel single touches that shift.
         """
         best = self._sums(x)
         found = {}

@@ -22,9 +22,10 @@ class Estimate:
         low, high: 95 % interval.
         start: where the search began.
         bounds: of the search.
-        identifiable: whether the interval is finite, reaches no bound, and tells the value from 0 where 0 is a bound.
-        kept_low, kept_high: the interval if the parameters of `Fit.kept` have the values they were kept at; the same as
-            low and high where none was kept.
+        identifiable: whether the interval is finite, reaches no bound, and tells the value from 0
+            where 0 is a bound.
+        kept_low, kept_high: the interval if the parameters of `Fit.kept` have the values they
+            were kept at; the same as low and high where none was kept.
         freedom: degrees of freedom that the standard deviation is known with.
     """
 
@@ -69,20 +70,22 @@ class Fit:
         model: of what.
         estimates: one a free parameter.
         correlation (P, P): of the estimates; NaN where one has no finite interval.
-        kept: parameters that the search kept at their start, because the data see a combination of them alone.
+        kept: parameters that the search kept at their start, because the data see a combination
+            of them alone.
         unseen: those combinations, and those that are seen worse than the parameters are large, in words.
         agreement: of the halves of the data, one a parameter that both halves tell.
         parameters: every parameter of the model, the identified ones in place.
         delay: the identified one, s: beyond what the map says and what was given.
         fitted, held: numbers of the windows that were fitted and of those that were not.
-        before, after: error -> (on fitted windows, on held ones) with the parameters at the start and the estimates:
-            "rmse", and median and 90th percentile of the largest error at the end of a window.
-        sensitivities: how derivatives were taken, and how far central differences at the solution are from them.
+        before, after: error -> (on fitted windows, on held ones) with the parameters at the start and the
+            estimates: "rmse", and median and 90th percentile of the largest error at the end of a window.
+        sensitivities: how derivatives were taken, and how far central differences at the solution
+            are from them.
         covariance: how the intervals were found.
         warnings: what the data cannot tell, and what does not fit.
         evaluations: runs of all windows.
-        outcome: "converged"; "unconverged" where the search ended before that, with intervals about where it ended; or
-            "stopped" at the time limit: the best so far, without intervals and errors.
+        outcome: "converged"; "unconverged" where the search ended before that, with intervals about where
+            it ended; or "stopped" at the time limit: the best so far, without intervals and errors.
         message: of the search.
         profile: parameter -> values about its estimate, and the cost at each over that at the estimate.
     """

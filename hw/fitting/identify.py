@@ -37,8 +37,8 @@ def identify(
 ) -> Fit:  # fmt: skip
     """Fit parameters to a log.
 
-    The residuals are those of the measured coordinates in every window; windows i with i % hold = hold - 1 are held
-    out.
+    The residuals are those of the measured coordinates in every window; windows i with i % hold =
+    hold - 1 are held out.
 
     Args:
         log: what was recorded; several are taken as windows of their own.
@@ -47,17 +47,19 @@ def identify(
         parameters: where not the model's defaults: the start of the search, and what is kept.
         restart: time between restarts, s; the model's usual one if not given; 0 for one window a log.
         horizon: length of a window, s; up to the next restart if not given.
-        starts: "free": the start of each window is an unknown too; "measured": it is the measured state, whose noise no
-            interval counts; "auto": free wherever derivatives are exact and the unknowns are not too many.
+        starts: "free": the start of each window is an unknown too; "measured": it is the measured
+            state, whose noise no interval counts; "auto": free wherever derivatives are exact and
+            the unknowns are not too many.
         hold: every hold-th window is held out of the fit; 0 for none.
         stride: of so many samples one is compared (neighbours that tell the same need not all be).
         bounds: name -> lowest and highest value, inside those of the model.
         engine: what runs a model whose contacts open: E or E:PROFILE.
         delay: of the measured coordinates beyond what the column map says, s; a free one is beyond this.
-        budget: time that the search may take, s; the best so far is what it then gives, with its intervals and the
-            outcome "unconverged".
-        time_limit: time that all of it may take, s: looked at before every run of a window, in the search and when its
-            end is judged; the outcome is then "stopped", with the best so far and no intervals.
+        budget: time that the search may take, s; the best so far is what it then gives, with its
+            intervals and the outcome "unconverged".
+        time_limit: time that all of it may take, s: looked at before every run of a window, in
+            the search and when its end is judged; the outcome is then "stopped", with the best so
+            far and no intervals.
 
     Raises:
         UnknownName: for a model or parameter that does not exist.

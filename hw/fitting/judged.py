@@ -34,11 +34,13 @@ class Search:
     """A search that has ended, with what it was asked.
 
     Attributes:
-        model, numbers, free: what was searched: the model, all its parameters, and the names of the free ones.
+        model, numbers, free: what was searched: the model, all its parameters, and the names of
+            the free ones.
         problem: residuals and derivatives of the fitted windows.
         x0, found: where it began and ended.
         limits, sizes: bounds and typical sizes of the unknowns.
-        sides: problems of the fitted and of the held-out windows, all started as measured; None for no windows.
+        sides: problems of the fitted and of the held-out windows, all started as measured; None
+            for no windows.
         fitted, held: their numbers.
     """
 

@@ -19,16 +19,18 @@ def profiles(
 ) -> dict[int, tuple[Floats, Floats]]:
     """Sum of squares over that at the estimate, along the line on which the linear fit of the others lies.
 
-    The residuals are those of the model, not of its linearisation: a profile that is no parabola says that intervals
-    from derivatives are too narrow or too wide. It bounds the profile of a search at every value from above, and is
-    equal to it to third order. Where the time limit ends it, what is complete is returned.
+    The residuals are those of the model, not of its linearisation: a profile that is no parabola
+    says that intervals from derivatives are too narrow or too wide. It bounds the profile of a
+    search at every value from above, and is equal to it to third order. Where the time limit ends
+    it, what is complete is returned.
 
     Args:
         problem: residuals of the fitted windows.
         x: estimates of all unknowns (P,).
         J: their derivatives there (N, P).
         sizes: typical size of each.
-        stds: unknown -> its standard deviation, of those that are profiled; the others of these columns go along.
+        stds: unknown -> its standard deviation, of those that are profiled; the others of these
+            columns go along.
         limits: bounds of all unknowns.
 
     Returns:

@@ -1,7 +1,7 @@
 """Compiled Runge-Kutta 4 in complex arithmetic for a mechanism whose rows are all held on.
 
-Every operation is analytic, so that a run from x + i s e_k carries the derivative of its own numbers by x_k in its
-imaginary part: exact to rounding for the discrete motion, whose own error is that of the step.
+Every operation is analytic, so that a run from x + i s e_k carries the derivative of its own numbers by
+x_k in its imaginary part: exact to rounding for the discrete motion, whose own error is that of the step.
 """
 
 from __future__ import annotations

@@ -99,8 +99,8 @@ class _Timed:
 def search(problem: Any, limits: tuple[Floats, Floats], scale: Any, count: int, budget: float) -> Found:
     """Make the residuals of a problem small.
 
-    Where no residual sees a combination of parameters, one of them is kept at its start, so that the search has an end;
-    if it turns out at the end that the data see it after all, it is let go.
+    Where no residual sees a combination of parameters, one of them is kept at its start, so that
+    the search has an end; if it turns out at the end that the data see it after all, it is let go.
 
     Args:
         problem: residuals and derivatives.

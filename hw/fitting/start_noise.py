@@ -1,10 +1,11 @@
 """Would the estimates be others if the windows started elsewhere? A test of starts that were taken as measured.
 
-The noise of a measured start moves its whole window: it makes residuals that no noise of single samples makes, biases
-the estimate, and no interval counts it. With the starts as unknowns that is gone. One Gauss-Newton step tells to first
-order where the estimates would then be: every window's residuals and derivatives are projected onto what its own start
-cannot change (its Schur complement), so that the parameters are the only unknowns left. A difference between two
-estimates of which one is right whether or not the measured starts are refutes these (Hausman 1978).
+The noise of a measured start moves its whole window: it makes residuals that no noise of single
+samples makes, biases the estimate, and no interval counts it. With the starts as unknowns that is
+gone. One Gauss-Newton step tells to first order where the estimates would then be: every window's
+residuals and derivatives are projected onto what its own start cannot change (its Schur
+complement), so that the parameters are the only unknowns left. A difference between two estimates
+of which one is right whether or not the measured starts are refutes these (Hausman 1978).
 """
 
 from __future__ import annotations

@@ -62,9 +62,9 @@ SAME = 2000  # times that one place may be read: parsers keep what many channels
 class MeteredFile(io.BufferedReader):
     """A file for a parser that follows links: no read reaches beyond the end, and links that lead back run out.
 
-    Cyclic links make a parser read the same blocks for ever. What a whole structure costs to read is some times the
-    file's size, so a parser that has read much more goes in circles. Lengths are cut at the file's end before anything
-    is allocated for them.
+    Cyclic links make a parser read the same blocks for ever. What a whole structure costs to read
+    is some times the file's size, so a parser that has read much more goes in circles. Lengths
+    are cut at the file's end before anything is allocated for them.
 
     Args:
         path: the file.

@@ -18,7 +18,8 @@ class Column:
 
     Attributes:
         name: name, unique in the file; an element of a vector ends in its index from 0, `force[2]`.
-        type: numpy name of the stored type; "text" where a reader will find out whether the cells are numbers.
+        type: numpy name of the stored type; "text" where a reader will find out whether the cells
+            are numbers.
         unit: unit as the file tells it; empty if it does not.
     """
 
@@ -35,7 +36,8 @@ class Group:
         name: name in the file; empty where a file has one group only.
         rows: number of rows; None where only reading tells.
         columns: in the order of the file.
-        step: time between samples where the file holds that instead of a column of times, s; 0 if it does not.
+        step: time between samples where the file holds that instead of a column of times, s; 0 if
+            it does not.
         start: time of the first sample then, s.
     """
 

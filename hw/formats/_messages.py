@@ -161,7 +161,8 @@ def rows_of(
         columns: the wanted ones.
 
     Raises:
-        LogFormatError: at a message that lacks one of the columns, or if there are fewer messages than announced.
+        LogFormatError: at a message that lacks one of the columns, or if there are fewer messages
+            than announced.
     """
     types = {column.name: column.type for column in group.columns}
     row = 0

@@ -49,7 +49,8 @@ def open_log(path: Path, options: Options) -> McapReader:
 class McapReader:
     """Numbers in the messages of every topic, chunk by chunk, with their checksums checked.
 
-    Chunks are read in the order of the file, whatever its indices say, and unfolded to the size that they tell.
+    Chunks are read in the order of the file, whatever its indices say, and unfolded to the size
+    that they tell.
     """
 
     def __init__(self, path: Path) -> None:

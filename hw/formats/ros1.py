@@ -33,8 +33,8 @@ def open_log(path: Path, options: Options) -> RosbagReader:
 class RosbagReader:
     """Numbers in the messages of every topic whose type is known.
 
-    A ROS 1 bag and most ROS 2 bags carry the definitions of their messages; where one does not, those of ROS 2
-    Humble are taken, and a topic of an unknown type is refused.
+    A ROS 1 bag and most ROS 2 bags carry the definitions of their messages; where one does not,
+    those of ROS 2 Humble are taken, and a topic of an unknown type is refused.
 
     Args:
         path: the bag.
@@ -123,8 +123,8 @@ class RosbagReader:
 def fault_of(types: Mapping[str, Any], name: str) -> str:
     """What is wrong with a message type; empty if nothing is, or if it is not known.
 
-    Types inside types multiply: ten levels of ten make 1e10 values out of a kilobyte of definitions, and a list of
-    empty messages takes no bytes however long it is.
+    Types inside types multiply: ten levels of ten make 1e10 values out of a kilobyte of
+    definitions, and a list of empty messages takes no bytes however long it is.
 
     Args:
         types: fields of every known type, as rosbags lists them.

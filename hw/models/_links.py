@@ -85,7 +85,8 @@ def scene(name: str, title: str, count: int, numbers: Numbers, segment: Segment)
 def on_hinges(case: Case, powered: bool = True, steady: bool = False) -> Form:
     """Return a chain of hinges, r_0 = pi - th_0 and r_i = th_(i-1) - th_i: its links hang straight at zero.
 
-    Hinges turn clockwise, seen with x to the right and z up, so that what turns a link forward turns its hinge back.
+    Hinges turn clockwise, seen with x to the right and z up, so that what turns a link forward
+    turns its hinge back.
     """
     n, given = int(case.parameters["links"]), case.inputs
     dry = np.array([case.number(f"s{i + 1}") for i in range(n)])

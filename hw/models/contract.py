@@ -79,24 +79,26 @@ class Model:
         inputs: names of the recorded torques that drive it, N m; a log without any of them is a free motion.
         forces: names of the case's further inputs: what acts besides, and may be estimated.
         build: (parameters, segment) -> the scene of one stretch.
-        places: parameter -> its place in the parameter array of the reference, for exact derivatives; a model whose
-            contacts open has none, and is differentiated by finite differences.
-        loop: (parameters, segment, log) -> motion of one stretch under the model's own controller, which follows the
-            recorded references; None where there is no controller.
+        places: parameter -> its place in the parameter array of the reference, for exact derivatives;
+            a model whose contacts open has none, and is differentiated by finite differences.
+        loop: (parameters, segment, log) -> motion of one stretch under the model's own
+            controller, which follows the recorded references; None where there is no controller.
         references: names of the references that the controller follows.
         read: the measured coordinates of a log, and their rates if it has them.
         see: the measured coordinates of a run at given times.
-        turns: of each rotation among the compared coordinates, the first of the three that are its rotation vector.
+        turns: of each rotation among the compared coordinates, the first of the three that are
+            its rotation vector.
         differ: (measured, predicted), both (n, k) -> what an identification makes small (n, k).
         engine: what runs it where derivatives are finite differences.
         falls: which compared coordinate jumps in its rate at impacts; -1 for none.
         restart: usual time between restarts, s; 0 for a free run.
-        start_span: length of what a window's start is fitted to, s; 0 where the measured state itself is the start.
+        start_span: length of what a window's start is fitted to, s; 0 where the measured state
+            itself is the start.
         settings: engine -> settings of the usual profile.
         why_not: engine -> the sentence why it cannot run the model.
         profiles: engine -> profile, where the usual one does not serve.
-        limits: on metrics of its replays, judged by the commands: of shares (`fit`, `*_inside`) the least, of others
-            the largest size; `held_out_worse` is that of an identification.
+        limits: on metrics of its replays, judged by the commands: of shares (`fit`, `*_inside`)
+            the least, of others the largest size; `held_out_worse` is that of an identification.
     """
 
     name: str

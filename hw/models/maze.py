@@ -19,7 +19,8 @@ SCENE = ("ring", "side", "angle", "theta", "t_end", "controller", "seed", "noise
 def build(numbers: Numbers, segment: Segment) -> Case:
     """One stretch under recorded torques on the maze, with the ball on the face that is nearest at the start.
 
-    The turn of the ball is not measured: it starts at 0, and its rate is that of rolling on that face without slip.
+    The turn of the ball is not measured: it starts at 0, and its rate is that of rolling on that
+    face without slip.
     """
     theta, x, y = segment.y.tolist()
     turning, xd, yd = segment.yd.tolist()

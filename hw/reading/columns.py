@@ -100,8 +100,8 @@ class Columns(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=T
         options: of the format.
         synthetic: whether the log was computed, not measured.
         part: column of whole numbers that tells apart the runs in one file.
-        join: how signals with times of their own come to the rows of `[time]`: "exact" (the times must be equal),
-            "hold" (the last sample before) or "linear".
+        join: how signals with times of their own come to the rows of `[time]`: "exact" (the times
+            must be equal), "hold" (the last sample before) or "linear".
         time: where the times are.
         coordinates, velocities, inputs, references, sensors: signals by the model's names.
     """
@@ -133,8 +133,8 @@ def load_columns(source: str | Path) -> Columns:
         source: a TOML file, or the name of one of `maps()`.
 
     Raises:
-        ColumnMapError: with the path of the key, for what is no TOML, an unknown key, a wrong type, a number that is
-            not finite or a unit that does not exist.
+        ColumnMapError: with the path of the key, for what is no TOML, an unknown key, a wrong
+            type, a number that is not finite or a unit that does not exist.
     """
     path = Path(arguments.path("columns", source))
     if str(source) in maps():

@@ -45,7 +45,8 @@ class Repair:
     """A change of the recorded rows that was asked for.
 
     Attributes:
-        name: "drop_duplicates", "fill_dropped", "unwrap" or "trim" (rows before the first sample of a joined signal).
+        name: "drop_duplicates", "fill_dropped", "unwrap" or "trim" (rows before the first sample
+            of a joined signal).
         rows: number of rows removed, added, or at which an angle wrapped.
         row: row of the file where it happened first.
         t: its time, s.

@@ -98,8 +98,8 @@ def make_plan(path: Path, reader: Reader, columns: Columns) -> Plan:
     """Find every signal of a map in an open log.
 
     Raises:
-        LogFormatError: for a column that the file does not have, cannot be read as numbers or has another unit than
-            the map says.
+        LogFormatError: for a column that the file does not have, cannot be read as numbers or has
+            another unit than the map says.
     """
     found = _Finder(path, reader)
     time = columns.time

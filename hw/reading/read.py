@@ -108,11 +108,12 @@ def read(
 
     Args:
         path: file of any format of `formats.names()`, or the folder of a ROS 2 bag.
-        columns: the column map: its file, a name of `maps()`, or itself; not needed for a log that `store` wrote.
+        columns: the column map: its file, a name of `maps()`, or itself; not needed for a log
+            that `store` wrote.
         part: number of the run, where the map names a column that tells several apart.
-        repair: any of "drop_duplicates" (rows with the time of the row before), "fill_dropped" (samples that are
-            missing: measured signals linearly, commanded ones held) and "unwrap" (coordinates in rad that jump by whole
-            turns); what was done is in the provenance.
+        repair: any of "drop_duplicates" (rows with the time of the row before), "fill_dropped"
+            (samples that are missing: measured signals linearly, commanded ones held) and "unwrap"
+            (coordinates in rad that jump by whole turns); what was done is in the provenance.
         limit: largest size of all its numbers in memory, bytes; what `memory` admits if not given.
         memory: bytes over the file's own size that reading may take; a file that unfolds to more is refused.
 
@@ -124,7 +125,8 @@ def read(
         LogFormatError: for a log that cannot be read or trusted, with row and column of the first offence.
         FormatUnavailable: if the format's package is not installed; the message names the extra.
         UnknownName: for a repair that does not exist.
-        InvalidValue: if the map tells runs apart and none was named, or the reverse; for repairs of a stored log.
+        InvalidValue: if the map tells runs apart and none was named, or the reverse; for repairs
+            of a stored log.
     """
     path = Path(arguments.path("log", path))
     if limit is not None:

@@ -61,7 +61,8 @@ def fill_dropped(
 ) -> tuple[Rows, tuple[Repair, ...], NDArray[np.int64]]:
     """Put rows where samples are missing, evenly between their neighbours.
 
-    What is measured is interpolated linearly there, what is commanded holds. Longer gaps than 1000 samples stay.
+    What is measured is interpolated linearly there, what is commanded holds. Longer gaps than
+    1000 samples stay.
 
     Args:
         block: the whole log; time strictly increasing.

@@ -55,7 +55,8 @@ def store(log: Log, path: str | Path) -> str:
         path: the file; replaced if it is there.
 
     Returns:
-        SHA-256 of its numbers, with their names and units: the same for the same log, however it is compressed.
+        SHA-256 of its numbers, with their names and units: the same for the same log, however it
+            is compressed.
 
     Raises:
         OutputError: if the file cannot be written.

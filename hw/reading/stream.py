@@ -121,7 +121,8 @@ def collect(blocks: Iterable[Rows], plan: Plan, group: Group, limit: int) -> Row
         limit: largest size, bytes.
 
     Raises:
-        LogFormatError: if there are no rows, or more than the limit admits; the announced number is refused at once.
+        LogFormatError: if there are no rows, or more than the limit admits; the announced number
+            is refused at once.
     """
     announced = 0 if plan.columns.part else group.rows or 0
     held: tuple[NDArray[Any], ...] = ()

@@ -108,7 +108,8 @@ def survey(path: str | Path, columns: Columns | str | Path | None = None, *, mem
 
     Args:
         path: file of any format of `formats.names()`, or the folder of a ROS 2 bag.
-        columns: a map whose `format` and `options` (delimiter, decimal mark, encoding, ...) the file is read by.
+        columns: a map whose `format` and `options` (delimiter, decimal mark, encoding, ...) the
+            file is read by.
         memory: as for `read`.
 
     Raises:

@@ -1,14 +1,14 @@
 """Backwards: the torque that a recorded motion needs, and the force that nobody measured.
 
-The measured coordinates y with their rates and accelerations, from polynomials through the samples, give the whole
-motion of a mechanism whose rows are closed: H v = 0 and H v' = -H' v, so v = S y' and v' = S y'' + s. With S^T H^T = 0
-the multipliers drop out and
+The measured coordinates y with their rates and accelerations, from polynomials through the
+samples, give the whole motion of a mechanism whose rows are closed: H v = 0 and H v' = -H' v, so
+v = S y' and v' = S y'' + s. With S^T H^T = 0 the multipliers drop out and
 
     S^T (M v' - f(q, v, 0)) = S^T B u
 
-holds the torques that act (u of the motors) and the force that acts besides (u of the contact), B = df/du.
-A smoothed acceleration is a mean over its samples: recorded torques are taken in the same mean, and an estimated force
-is one.
+holds the torques that act (u of the motors) and the force that acts besides (u of the contact), B
+= df/du. A smoothed acceleration is a mean over its samples: recorded torques are taken in the
+same mean, and an estimated force is one.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ class Inferred:
         value (n, k): the estimate.
         std (n, k): standard deviation that the noise of the measured coordinates gives it.
         recorded (n, k): the same as the log has it; NaN where it does not.
-        condition (n,): of the map from what is estimated to the forces that the motion shows, its columns of size 1.
+        condition (n,): of the map from what is estimated to the forces that the motion shows, its
+            columns of size 1.
     """
 
     t: Floats
@@ -76,7 +77,8 @@ def inverse(
 
     Args:
         log: what was recorded.
-        model: its name in `hw.models`, or itself; its rows are always on and all its free coordinates are measured.
+        model: its name in `hw.models`, or itself; its rows are always on and all its free
+            coordinates are measured.
         parameters: of the model, where not its defaults.
         delay: of the measured coordinates beyond what the column map says, s.
         half: samples on each side of the polynomials: more for less noise, fewer for quicker motion.
@@ -84,8 +86,8 @@ def inverse(
         stride: of so many samples one is evaluated.
 
     Raises:
-        SceneError: if the log or the model does not fit, or the motion cannot tell the torques apart: it names those
-            that it cannot, the coordinates that none of them moves, and the condition.
+        SceneError: if the log or the model does not fit, or the motion cannot tell the torques apart:
+            it names those that it cannot, the coordinates that none of them moves, and the condition.
         InvalidValue: for a log shorter than a polynomial.
     """
     chosen = models.chosen(model)
@@ -220,7 +222,8 @@ def conditions(t: Floats, B: Floats, rows: tuple[str, ...], names: tuple[str, ..
         model: whose they are.
 
     Raises:
-        SceneError: naming inputs that cannot be told apart, coordinates that none of them moves, rank and condition.
+        SceneError: naming inputs that cannot be told apart, coordinates that none of them moves,
+            rank and condition.
     """
     k, m = B.shape[1:]
     if not m:

@@ -19,14 +19,15 @@ ALIKE = 0.8  # part of the correlation that noise admits, from which on two moti
 REPEATS = 0.1
 """Angle between a motion and itself moved (arc cosine of their correlation), up to which the motion repeats itself."""
 EXPLAINED = 3.0
-"""That angle over the one between measurement and prediction where they are most alike, up to which a maximum that is
-lower for the model's error alone may be the delay. Of 1,200 motions of three harmonics, whose amplitudes and phases the
-model has wrong by 0, 5 and 20 %, none was given a wrong delay; with 0.9 of the highest maximum alone one was."""
+"""That angle over the one between measurement and prediction where they are most alike, up to
+which a maximum that is lower for the model's error alone may be the delay. Of 1,200 motions of
+three harmonics, whose amplitudes and phases the model has wrong by 0, 5 and 20 %, none was given
+a wrong delay; with 0.9 of the highest maximum alone one was."""
 WIDE, REAL = 4, 1e-9
 """Neighbours to either side that tell how high a maximum between samples is; imaginary part of a real root."""
 UNSURE = 3.0
-"""Error of that over what one neighbour less changes: r/(1 - r) with r = sin^2(w/2), w rad a sample; 3 at 3 samples a
-period."""
+"""Error of that over what one neighbour less changes: r/(1 - r) with r = sin^2(w/2), w rad a
+sample; 3 at 3 samples a period."""
 NEARER = 0.8  # how much nearer to 0 a maximum must be than its rival on the other side
 
 
@@ -69,10 +70,11 @@ def delay(y: Floats, yhat: Floats, step: float, reach: float = REACH) -> float:
 def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = REACH) -> float:
     """How much later increments a are than increments b, s: a maximum of their cross-correlation.
 
-    The correlation is taken by FFT within each window and normalised by the energy of both at each lag; a polynomial
-    through a maximum and its neighbours gives parts of a sample. (Of increments: slow drifts would hide the peak.)
-    A motion that repeats itself correlates nearly as well at lags of whole periods, and what is left to tell them apart
-    is the model's error: of all maxima that this error may have lowered, the one nearest to 0 is taken.
+    The correlation is taken by FFT within each window and normalised by the energy of both at
+    each lag; a polynomial through a maximum and its neighbours gives parts of a sample. (Of
+    increments: slow drifts would hide the peak.) A motion that repeats itself correlates nearly
+    as well at lags of whole periods, and what is left to tell them apart is the model's error: of
+    all maxima that this error may have lowered, the one nearest to 0 is taken.
 
     Args:
         a: of the measurement, equidistant, one array a window.
@@ -81,9 +83,9 @@ def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = 
         reach: largest lag, as a part of the shortest window.
 
     Returns:
-        NaN where one of them does not move, where they do not have the same shape at any lag, where the correlation is
-        highest at the edge, or where maxima on both sides of 0 are as near to it (the delay is then about half a
-        period, forwards or backwards).
+        NaN where one of them does not move, where they do not have the same shape at any lag,
+        where the correlation is highest at the edge, or where maxima on both sides of 0 are as
+        near to it (the delay is then about half a period, forwards or backwards).
     """
     most = max(2, int(reach * min(map(len, a))))
     lags, rho = _lagged(a, b, most)
@@ -107,8 +109,8 @@ def shift(a: Sequence[Floats], b: Sequence[Floats], step: float, reach: float = 
 def _vertex(rho: Floats, k: int, wide: int = WIDE) -> tuple[float, float]:
     """Where the polynomial through rho[k] and its neighbours is highest, in samples behind k, and how high it is.
 
-    Of a motion with few samples a period a parabola would be too low between two of them: a lag of a whole period would
-    look less alike than one that a sample happens to meet.
+    Of a motion with few samples a period a parabola would be too low between two of them: a lag
+    of a whole period would look less alike than one that a sample happens to meet.
     """
     wide = min(wide, k, len(rho) - 1 - k)
     places = np.arange(-wide, wide + 1.0)
@@ -136,9 +138,10 @@ def _angle(rho: Floats, k: int) -> float:
 def _rivals(b: Sequence[Floats], most: int, peaks: NDArray[np.int64], heights: Floats) -> NDArray[np.int64]:
     """Those maxima that are the delay if the highest is so by the model's error alone.
 
-    The prediction moved to the one and to the other lag are phi apart. If it were the lower one, the model's error
-    would have to lie along their difference for the higher one to be nearer than phi: by chance for small angles only.
-    Windows shorter than twice the lags cannot be held against themselves: all maxima stay.
+    The prediction moved to the one and to the other lag are phi apart. If it were the lower one,
+    the model's error would have to lie along their difference for the higher one to be nearer
+    than phi: by chance for small angles only. Windows shorter than twice the lags cannot be held
+    against themselves: all maxima stay.
     """
     best = int(peaks[np.argmax(heights)])
     reach = 2 * most + 4

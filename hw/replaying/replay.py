@@ -40,15 +40,15 @@ def replay(
 ) -> Comparison:  # fmt: skip
     """Run a model through a log.
 
-    The model starts in every window from what was measured there; where rates are not, from the state that fits the
-    window's first samples (`Model.start_span`). Recorded inputs change at their recorded times and
-    hold between them; the integrator is free between them and is never resampled.
+    The model starts in every window from what was measured there; where rates are not, from the
+    state that fits the window's first samples (`Model.start_span`). Recorded inputs change at their
+    recorded times and hold between them; the integrator is free between them and is never resampled.
 
     Args:
         log: what was recorded.
         model: its name in `hw.models`, or itself.
-        kind: "forward": recorded inputs drive the model; "closed_loop": recorded references drive the model and its
-            controller (one free run, reference alone).
+        kind: "forward": recorded inputs drive the model; "closed_loop": recorded references drive
+            the model and its controller (one free run, reference alone).
         wanted: engines, each E or E:PROFILE.
         parameters: of the model, where not its own defaults.
         restart: time between restarts, s; 0 for a free run; the model's usual one if not given.

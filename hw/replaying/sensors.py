@@ -87,7 +87,8 @@ class Unlagged:
 def unlagged(t: Floats, y: Floats, rate: float, noise: float, quantum: float = 0.0) -> Unlagged:
     """Undo a first-order lag: x_k = (y_(k+1) - c y_k)/(1 - c), c = e^(-ks (t_(k+1) - t_k)), for x that holds.
 
-    The noise of a reading comes out sqrt(1 + c^2)/(1 - c) times as large, correlated by -c/(1 + c^2) with the next.
+    The noise of a reading comes out sqrt(1 + c^2)/(1 - c) times as large, correlated by -c/(1 +
+    c^2) with the next.
 
     Args:
         t: times (n,), s.

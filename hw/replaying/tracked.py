@@ -1,8 +1,8 @@
 """The force that nobody measured, followed through a log by an extended Kalman filter and smoother.
 
-Beside `estimate_force`, which balances accelerations one instant at a time, this one knows the equations of motion from
-sample to sample and how quickly forces change (a Gauss-Markov process): positions alone serve, nothing is smoothed by a
-polynomial, and the covariance holds the errors of neighbouring samples together.
+Beside `estimate_force`, which balances accelerations one instant at a time, this one knows the equations of
+motion from sample to sample and how quickly forces change (a Gauss-Markov process): positions alone serve,
+nothing is smoothed by a polynomial, and the covariance holds the errors of neighbouring samples together.
 """
 
 from __future__ import annotations

@@ -82,8 +82,9 @@ def delta_log(plant: Plant, sensors: Sensors | None = None, seed: int = 0) -> Lo
         seed: of noise, jitter and losses.
 
     Returns:
-        A log whose provenance says that it is synthetic. Coordinates q11, q21, q31 (with the delay that a map would
-        state: 0, for it is to be found), inputs torque 1 to 3, references x, y, z, sensors force x, y, z.
+        A log whose provenance says that it is synthetic. Coordinates q11, q21, q31 (with the
+        delay that a map would state: 0, for it is to be found), inputs torque 1 to 3, references
+        x, y, z, sensors force x, y, z.
     """
     chosen = sensors or Sensors()
     random = np.random.default_rng(seed)

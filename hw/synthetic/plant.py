@@ -67,7 +67,8 @@ def delta_plant(pushes: Iterable[Push] = (), **parameters: float | int | str | b
 
     Raises:
         EngineUnavailable: if MuJoCo is not installed.
-        UnknownName, InvalidValue, SceneError: for a scene that cannot be built or that MuJoCo does not finish.
+        UnknownName, InvalidValue, SceneError: for a scene that cannot be built or that MuJoCo
+            does not finish.
     """
     case = cases.load("delta_tracking", **parameters)  # type: ignore[arg-type]
     ticks = scene.sampling_of(case.parameters).ticks(case.t_end)

@@ -1,9 +1,9 @@
 """Rates and accelerations of sampled coordinates, by polynomials through the samples around each instant.
 
-A polynomial across an impact gives neither the rate before nor the one behind. So at the starts of windows, of all
-stretches of samples that contain an instant, the longest is taken whose polynomial leaves no more than the noise (a
-choice of the width by the data, after Lepski 1991, and of the side as in the edge-preserving smoothing of McDonald and
-Owen 1986).
+A polynomial across an impact gives neither the rate before nor the one behind. So at the starts
+of windows, of all stretches of samples that contain an instant, the longest is taken whose
+polynomial leaves no more than the noise (a choice of the width by the data, after Lepski 1991,
+and of the side as in the edge-preserving smoothing of McDonald and Owen 1986).
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ def derivatives(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Smoothed value, rate and acceleration of samples, and how noise goes into the acceleration.
 
-    A polynomial is fitted by least squares to 2 half + 1 samples around each (fewer at the ends, where it stands
-    aside of the middle), at their own times (Savitzky and Golay 1964 for equidistant ones).
+    A polynomial is fitted by least squares to 2 half + 1 samples around each (fewer at the ends, where
+    it stands aside of the middle), at their own times (Savitzky and Golay 1964 for equidistant ones).
 
     Args:
         t: times (n,), s.
@@ -102,7 +102,8 @@ def derivatives(
         rows: at which samples (m,); all if not given.
 
     Returns:
-        value, rate, acceleration (m, k), and gain (m, 3): standard deviations of the three for unit white noise.
+        value, rate, acceleration (m, k), and gain (m, 3): standard deviations of the three for
+            unit white noise.
 
     Raises:
         InvalidValue: if there are too few samples for the polynomial.
@@ -128,8 +129,9 @@ def _weights(t: Floats, half: int, degree: int, rows: Rows) -> tuple[Rows, Float
 def felt(t: Floats, u: Floats, delay: float, half: int, degree: int, rows: Rows) -> Floats:
     """What of a held input the acceleration of `derivatives` shows (m, k).
 
-    The fitted acceleration sum w_k y_k is a mean of the true one with the weight that integrates w twice (Peano's
-    kernel); a_j from t_j to t_(j+1) adds (x_+(t_j)^2 - x_+(t_(j+1))^2)/2 to y_k, with x(t) = t_k - delay - t.
+    The fitted acceleration sum w_k y_k is a mean of the true one with the weight that integrates
+    w twice (Peano's kernel); a_j from t_j to t_(j+1) adds (x_+(t_j)^2 - x_+(t_(j+1))^2)/2 to y_k,
+    with x(t) = t_k - delay - t.
 
     Args:
         t: times (n,), s.

@@ -1,7 +1,8 @@
 """Coordinates that are rotations: three components of a rotation vector are one turn, and turns do not subtract.
 
-A rotation vector jumps by 2 pi where its angle passes pi, so differences of components say up to 2 pi where the cube
-itself is hardly off. The difference of two turns is the logarithm of the relative rotation, at most pi long.
+A rotation vector jumps by 2 pi where its angle passes pi, so differences of components say up to
+2 pi where the cube itself is hardly off. The difference of two turns is the logarithm of the
+relative rotation, at most pi long.
 """
 
 from __future__ import annotations

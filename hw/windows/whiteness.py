@@ -1,13 +1,15 @@
 """Is what the model leaves over noise? Autocorrelation of residuals and their correlation with the inputs.
 
-For white residuals of n samples that do not depend on the input each correlation is normal with variance 1/n at every
-lag, so that 99 of 100 lie within +-2.576/sqrt(n) (Ljung, System Identification, 2nd ed., 16.6).
+For white residuals of n samples that do not depend on the input each correlation is normal with
+variance 1/n at every lag, so that 99 of 100 lie within +-2.576/sqrt(n) (Ljung, System
+Identification, 2nd ed., 16.6).
 
-Sampled much faster than anything moves, every residual fails that test: n is large, the lags span a fraction of the
-motion, and an error of the model far below the noise still shows. So residuals are averaged over as many samples as the
-motion allows (`stride`), and the band is widened by what an error as large as the noise of one sample (`floor`) would
-give: floor^2/c0 for a residual with itself, floor/sqrt(c0) with an input, c0 the variance of the averages. Inside then
-means: what the model leaves unexplained is not larger than the noise of a sample. Products never cross two windows.
+Sampled much faster than anything moves, every residual fails that test: n is large, the lags span a
+fraction of the motion, and an error of the model far below the noise still shows. So residuals are
+averaged over as many samples as the motion allows (`stride`), and the band is widened by what an
+error as large as the noise of one sample (`floor`) would give: floor^2/c0 for a residual with
+itself, floor/sqrt(c0) with an input, c0 the variance of the averages. Inside then means: what the
+model leaves unexplained is not larger than the noise of a sample. Products never cross two windows.
 """
 
 from __future__ import annotations
@@ -83,8 +85,8 @@ def crosscorrelation(
 ) -> Correlation:  # fmt: skip
     """Of a residual with an input, lags -most to most; beyond white noise of either it needs whitening.
 
-    Both pass the filter that whitens the input (autoregressive, of order 5, by least squares): a slow input alone would
-    widen the scatter beyond the band. Args as for `autocorrelation`; u like the residual.
+    Both pass the filter that whitens the input (autoregressive, of order 5, by least squares): a slow input
+    alone would widen the scatter beyond the band. Args as for `autocorrelation`; u like the residual.
     """
     left, inputs = ([averaged(piece, stride) for piece in _pieces(x)] for x in (residual, u))
     taps = _whitener(inputs)
@@ -100,8 +102,8 @@ def crosscorrelation(
 def stride_of(y: Floats | Sequence[Floats], noise: float) -> int:
     """Samples that a residual may be averaged over without losing what moves.
 
-    The mean frequency of the motion is that of its zero crossings (Rice 1944), |y'|/(2 pi |y - mean|), the noise of the
-    differences taken off.
+    The mean frequency of the motion is that of its zero crossings (Rice 1944), |y'|/(2 pi |y -
+    mean|), the noise of the differences taken off.
 
     Args:
         y: measured (n,), or one array a window.

@@ -27,7 +27,8 @@ class Window:
 
     Attributes:
         t (n,): recorded times, s; both ends belong to it.
-        age (n, k): how long after the window's beginning each measured value was true, s: its delay taken off.
+        age (n, k): how long after the window's beginning each measured value was true, s: its
+            delay taken off.
         y (n, k): measured coordinates.
         u (n, nu): recorded inputs, in force from each time on.
         segment: what a model needs to run it.
@@ -47,8 +48,8 @@ def windows(
 ) -> tuple[Window, ...]:
     """Cut a log.
 
-    Where rates are not recorded, a window that would start beside an impact starts behind it: samples within three of
-    an impact show neither the rate before it nor the one behind.
+    Where rates are not recorded, a window that would start beside an impact starts behind it:
+    samples within three of an impact show neither the rate before it nor the one behind.
 
     Args:
         log: what was recorded.

@@ -109,7 +109,8 @@ class Linearising:
         clamp: bound on |INT e| in each axis, m s (anti-windup).
         exact: My = S^T M S; else the approximation M11 - M12 h_x^-1 h_y.
         feedforward: add r''.
-        friction: add the reflected viscous friction of the robot; without it the damping of the loop is larger.
+        friction: add the reflected viscous friction of the robot; without it the damping of the
+            loop is larger.
     """
 
     gains: Gains | Mapping[float, Gains] = Gains()

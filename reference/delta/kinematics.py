@@ -130,8 +130,8 @@ def forward(robot: Robot, y: ArrayLike, guess: ArrayLike | None = None) -> Float
     Args:
         robot: the robot.
         y (3,): motor angles, rad.
-        guess (9,): a pose nearby, for Newton's method; without it the pose with the flange below the elbows is found
-            in closed form (three spheres) and polished.
+        guess (9,): a pose nearby, for Newton's method; without it the pose with the flange below
+            the elbows is found in closed form (three spheres) and polished.
 
     Raises:
         InvalidValue: if the arms cannot meet, or Newton's method does not converge from the guess.

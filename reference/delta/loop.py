@@ -1,7 +1,8 @@
 """The controlled robot as a linear model in continuous time, about a pose at which it is held.
 
-The plant is linearised with the loops closed exactly, in the flange's own coordinates through the virtual Jacobian Jv
-of the simulation. The controller computes with the control Jacobian Jy; its own compiled code is differenced.
+The plant is linearised with the loops closed exactly, in the flange's own coordinates through the
+virtual Jacobian Jv of the simulation. The controller computes with the control Jacobian Jy; its
+own compiled code is differenced.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ def closed_loop(robot: Robot, q: ArrayLike, controller: Linearising | Proportion
         controller: `Linearising()` if not given.
 
     Returns:
-        States z, z' of the flange and INT e (9,), which is left out where nobody reads it; inputs r, r', r'' (9,),
-        outputs z (3,), m.
+        States z, z' of the flange and INT e (9,), which is left out where nobody reads it; inputs
+        r, r', r'' (9,), outputs z (3,), m.
 
     Raises:
         SceneError: for a pose that is not closed or is singular.

@@ -30,8 +30,8 @@ def system(robot: Robot, *, p: float = 5.0, servo: Servo | None = None, program:
         robot: the robot.
         p: double pole of the closures, 1/s.
         servo: continuous servos on the motors.
-        program: a sampled controller, from `control.program`; a flange force may still be an input, motor torques are
-            then the controller's.
+        program: a sampled controller, from `control.program`; a flange force may still be an
+            input, motor torques are then the controller's.
 
     Raises:
         InvalidValue: if p is negative or not finite.

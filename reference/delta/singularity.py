@@ -20,9 +20,10 @@ class Margins:
     """Distances from the singularities, all 0 there and at most 1.
 
     Attributes:
-        direct: smallest singular value of the distal directions stacked as rows: at 0 the motors do not determine the
-            flange, the control Jacobian ends and forward kinematics breaks down.
-        inverse (3,): |n . d| of each arm: at 0 it is stretched or folded and cannot move its tip along itself.
+        direct: smallest singular value of the distal directions stacked as rows: at 0 the motors do
+            not determine the flange, the control Jacobian ends and forward kinematics breaks down.
+        inverse (3,): |n . d| of each arm: at 0 it is stretched or folded and cannot move its tip
+            along itself.
         chart (3,): |sin q_i2|: at 0 the distal link points along x and q_i3 is undefined.
     """
 
@@ -58,8 +59,8 @@ def elbow_angle(robot: Robot) -> float:
 def ill_posed_tilts(robot: Robot) -> Floats:
     """Directions (3, 3) of the distal links, unit vectors, at which H loses rank with the elbows together.
 
-    The links hang parallel from the common elbow; tan phi = 2 R/sqrt(l1^2 - R^2), towards 0, 120 and 240 degrees
-    from +y.
+    The links hang parallel from the common elbow; tan phi = 2 R/sqrt(l1^2 - R^2), towards 0, 120
+    and 240 degrees from +y.
     """
     R = robot.offset
     phi = math.atan2(2 * R, math.sin(elbow_angle(robot)) * robot.l1)

@@ -1,9 +1,9 @@
 """Derivatives at many points, compiled: complex steps through the kernels, several columns at a time.
 
-The residual r of `_derivatives` depends on few coordinates in each of its components. Columns of dr/dx that share no
-component are stepped together (Curtis, Powell and Reid 1974), so an arm of a robot costs as much as all its arms. One
-more step, along a direction in which all columns differ, tells whether the pattern held: the product with what was
-found must agree with it, or the point is given back as MISSED.
+The residual r of `_derivatives` depends on few coordinates in each of its components. Columns of dr/dx
+that share no component are stepped together (Curtis, Powell and Reid 1974), so an arm of a robot costs
+as much as all its arms. One more step, along a direction in which all columns differ, tells whether the
+pattern held: the product with what was found must agree with it, or the point is given back as MISSED.
 """
 
 from __future__ import annotations

@@ -4,12 +4,14 @@ With the active rows A, the accelerations and multipliers solve
 
     r(q, v, u; v', lam) = ( M v' - f - H_A^T lam ;  H_A v' + H_A' v + a1 H_A v + a0 h_A + a2 h_A^3 ) = 0
 
-whose derivative by (v', lam) is the saddle matrix K. By the implicit function theorem one real K serves every column:
-d(v', lam) = -K^-1 (dr/dx), where dr/dx at fixed v', lam is the imaginary part of r(x + i s e_k) over s. There is no
-difference of nearly equal numbers, so s = 1e-30 and the derivative is exact to rounding (Squire and Trapp 1998).
+whose derivative by (v', lam) is the saddle matrix K. By the implicit function theorem one real K
+serves every column: d(v', lam) = -K^-1 (dr/dx), where dr/dx at fixed v', lam is the imaginary
+part of r(x + i s e_k) over s. There is no difference of nearly equal numbers, so s = 1e-30 and
+the derivative is exact to rounding (Squire and Trapp 1998).
 
-Contacts that stick have their tangential rows among those that are solved. Those that slide have their forces,
-lam_t = -mu lam_n s with s = v_t/|v_t|, in the columns: K is not symmetric then, and its columns turn with the slip.
+Contacts that stick have their tangential rows among those that are solved. Those that slide have
+their forces, lam_t = -mu lam_n s with s = v_t/|v_t|, in the columns: K is not symmetric then, and
+its columns turn with the slip.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ class Derivatives:
         vd_x (n, 2 n), vd_u (n, nu): of the accelerations.
         lam_x (na, 2 n), lam_u (na, nu): of the multipliers.
         gap_x (nc, 2 n), rate_x (nc, 2 n): of every gap and of its rate.
-        size (n, 2 n + nu): of the terms that make up vd_x and vd_u: rounding is a part of it, however they cancel.
+        size (n, 2 n + nu): of the terms that make up vd_x and vd_u: rounding is a part of it,
+            however they cancel.
     """
 
     vd: Floats
@@ -69,8 +72,8 @@ def saddle(at: Point) -> tuple[Floats, Floats, Floats]:
     """K, and the v' and lam of the rows that are solved for, with K (v', lam) = (f, -law).
 
     Raises:
-        SceneError: if the active rows are redundant or jam here, a contact slides at no speed, a coordinate has no
-            inertia, or a value is not finite.
+        SceneError: if the active rows are redundant or jam here, a contact slides at no speed, a
+            coordinate has no inertia, or a value is not finite.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         blocks, f, H, h, drift = terms(at, at.q, at.v, at.u)

@@ -1,8 +1,8 @@
 """Linear models of systems whose actuators have activations: each is one state more, a' = u or tau a' = u - a.
 
-The kernels take an activation as the value from which it goes on, as an input, and the instant at which it was there.
-At that instant it is the value itself: the derivatives by it are those by that input, and what drives it acts on
-nothing else.
+The kernels take an activation as the value from which it goes on, as an input, and the instant at
+which it was there. At that instant it is the value itself: the derivatives by it are those by
+that input, and what drives it acts on nothing else.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """The direction of a slip in space that has just begun, and how it turns with the state.
 
-Friction turns a slip at a rate of mu lam_n/(m |v_t|). As |v_t| vanishes, its direction s follows from the state: it
-is that of the slip's acceleration, but for the rate w at which it turns,
+Friction turns a slip at a rate of mu lam_n/(m |v_t|). As |v_t| vanishes, its direction s follows
+from the state: it is that of the slip's acceleration, but for the rate w at which it turns,
 
     F(x, s) = s_perp . v_t'(x, s) - w s . v_t = 0        s_x = -F_x/F_s
 
-with w from the same equation without its last term, at the start, since that is small.
-A direction that is held instead, up to a slip of e, is off by the time that the slip takes to reach e, which is about
-its square root, and so are the derivatives of all that follows.
+with w from the same equation without its last term, at the start, since that is small. A
+direction that is held instead, up to a slip of e, is off by the time that the slip takes to reach
+e, which is about its square root, and so are the derivatives of all that follows.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
 """Small motions about many held poses, compiled: inputs and multipliers of equilibrium, then the reduced model.
 
-At rest, f(q, 0, u) + H^T lam = 0 with as many inputs as freedoms gives u and lam. With T (n, m) a basis of the motions
-that the rows admit, dq = T y, the small motions about it are (all derivatives of f + H^T lam at fixed u and lam)
+At rest, f(q, 0, u) + H^T lam = 0 with as many inputs as freedoms gives u and lam. With T (n, m) a
+basis of the motions that the rows admit, dq = T y, the small motions about it are (all
+derivatives of f + H^T lam at fixed u and lam)
 
     (T^T M T) y'' - (T^T d(f + H^T lam)/dv T) y' - (T^T d(f + H^T lam)/dq T) y = 0
 
-since what T changes multiplies f + H^T lam = 0. The rows' own law does not appear: this is the minimal realisation.
+since what T changes multiplies f + H^T lam = 0. The rows' own law does not appear: this is the
+minimal realisation.
 """
 
 from __future__ import annotations

@@ -144,8 +144,8 @@ def smoothed(z: Floats, P: Floats, before: Floats, ahead: Floats, moves: Floats)
 def exponential(X: Floats) -> Floats:
     """Exp(X) of a small matrix, its series after halving.
 
-    scipy.linalg.expm factorises, in threads of OpenBLAS: two of them on a busy machine made a whole filter 2.3 times as
-    slow (OPENBLAS_NUM_THREADS=2 against 1).
+    scipy.linalg.expm factorises, in threads of OpenBLAS: two of them on a busy machine made a
+    whole filter 2.3 times as slow (OPENBLAS_NUM_THREADS=2 against 1).
     """
     halvings = max(0, int(np.ceil(np.log2(max(float(np.linalg.norm(X, 1)) / REACH, 1.0)))))
     small, one = X / 2.0**halvings, np.eye(len(X))

@@ -51,8 +51,8 @@ def tangents(
 ) -> Tangents:  # fmt: skip
     """First derivatives of accelerations and multipliers at many states, exact to rounding.
 
-    What `linearise` finds at one state, compiled: about as long as 30 right-hand sides a state (Curtis, Powell and Reid
-    1974 for the columns that are stepped together).
+    What `linearise` finds at one state, compiled: about as long as 30 right-hand sides a state
+    (Curtis, Powell and Reid 1974 for the columns that are stepped together).
 
     Args:
         system: the mechanism.

@@ -26,7 +26,8 @@ class Modes:
     Attributes:
         poles (nx,): 1/s.
         vectors (nx, nx): right eigenvectors as columns, each with its largest component 1.
-        participation (nx, nx): part of each state (row) in each mode (column), columns sum to 1 (Perez-Arriaga 1982).
+        participation (nx, nx): part of each state (row) in each mode (column), columns sum to 1
+            (Perez-Arriaga 1982).
         states: names of the rows.
     """
 

@@ -27,16 +27,20 @@ class Point:
         active (na,): the rows that are on.
         p: parameters in place of the system's own; complex for a step in one of them.
         alpha (nc, 3), friction (nc,), drift (nc,): in force in place of the system's own.
-        sliding: contacts that slide, by their normal rows, and rows that do so against dry friction of their own.
-        way (nc,): by tangential row, the direction in which one slides whatever its velocity; NaN where that says it.
+        sliding: contacts that slide, by their normal rows, and rows that do so against dry
+            friction of their own.
+        way (nc,): by tangential row, the direction in which one slides whatever its velocity; NaN
+            where that says it.
         emerging: contacts that slide in space at hardly any speed, in the direction of their acceleration.
         spins (k,): rates at which the directions of what emerges turn, rad/s; 0 if not given.
         slow: part of its terms below which a slip velocity has no direction.
         idle: rows that follow from the other active ones, which hold them.
         sharing: these and those that they follow from, but for rows that nothing moves.
         held: places in `active` of the idle rows.
-        solved: places in `active` of the rows that are solved for: neither idle nor tangential ones of what slides.
-        slid: every contact that slides, with the places of its normal row, -1 for dry friction, and of its tangents.
+        solved: places in `active` of the rows that are solved for: neither idle nor tangential
+            ones of what slides.
+        slid: every contact that slides, with the places of its normal row, -1 for dry friction,
+            and of its tangents.
     """
 
     system: System
@@ -141,8 +145,9 @@ def directions(system: System, q: Floats) -> Floats:
 def turning(system: System, t: float, q: Floats, v: Floats) -> Floats:
     """T (n, n) of dq' = T dq + dv along a motion: the tangent space moves with it; 0 where q' = v, and at rest.
 
-    With q' = F(q, v) = N(q) v + r(q) and a deviation N dq of the positions, N dq' = (dF/dq) N dq - (dN/dt) dq + N dv,
-    which for a quaternion is dq' = dv - v x dq. Both derivatives are complex steps through the kernel.
+    With q' = F(q, v) = N(q) v + r(q) and a deviation N dq of the positions, N dq' = (dF/dq) N dq
+    - (dN/dt) dq + N dv, which for a quaternion is dq' = dv - v x dq. Both derivatives are complex
+    steps through the kernel.
     """
     n = system.n
     if system.velocity is None or not v.any():

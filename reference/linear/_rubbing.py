@@ -66,7 +66,8 @@ def independent(at: Point) -> Point:
     Of contacts that stick, only the shares of the load are open then; what moves is not.
 
     Raises:
-        SceneError: if contacts that slide are among those that share: their friction, and so the motion, is open.
+        SceneError: if contacts that slide are among those that share: their friction, and so the
+            motion, is open.
     """
     system = at.system
     blocks, _, H, _, _ = terms(at, at.q, at.v, at.u)

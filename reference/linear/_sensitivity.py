@@ -72,8 +72,8 @@ class Sensitivity:
     Attributes:
         run: the motion.
         state (nq + n,): q and v at the end.
-        by_start (2 n, 2 n): derivative by q0 and v0, by coordinates of the tangent spaces at both ends where q' is not
-            v (as `linearise`). Of a periodic motion over its period, the monodromy matrix.
+        by_start (2 n, 2 n): derivative by q0 and v0, by coordinates of the tangent spaces at both ends
+            where q' is not v (as `linearise`). Of a periodic motion over its period, the monodromy matrix.
         by_parameters (2 n, k): derivative by the parameters.
         names: of the parameters.
         jumps: the events that were passed.
@@ -107,24 +107,25 @@ def sensitivity(
     Collisions that follow one another at one instant, as through balls that touch, are passed one by one: the
     derivative is then that of deviations that part the balls, as long as those do not meet again.
 
-    A slip that stops takes the deviations of its velocity with it. Where a contact sticks from the start or from its
-    touch, so do those by which it would slip: they die out within times of their own size.
+    A slip that stops takes the deviations of its velocity with it. Where a contact sticks from the start
+    or from its touch, so do those by which it would slip: they die out within times of their own size.
 
     Args:
         system: the mechanism, without a sampled controller.
         q0: positions at the start (nq,).
         v0: velocities at the start (n,).
         t_end: horizon, s.
-        parameters: by name, "p[k]", "a0[i]", "a1[i]", "a2[i]" of row i's slow law, "mu[i]" of the friction of contact i
-            or the bound of row i's own, "drift[i]" of the surface along tangential row i.
+        parameters: by name, "p[k]", "a0[i]", "a1[i]", "a2[i]" of row i's slow law, "mu[i]" of the friction
+            of contact i or the bound of row i's own, "drift[i]" of the surface along tangential row i.
         u: constant inputs (nu,), zero if not given.
         rtol: tolerance of the motion and of its derivatives.
         collisions: rule for several contacts; under "simultaneous" one collision at a time only.
         max_steps: bound on the steps of the motion.
 
     Raises:
-        SceneError: for a sampled controller, a motion that switches discrete variables, rows that strike or switch as
-            one, a slip in space that turns back through zero, or a load of which the law leaves open who bears it.
+        SceneError: for a sampled controller, a motion that switches discrete variables, rows that
+            strike or switch as one, a slip in space that turns back through zero, or a load of
+            which the law leaves open who bears it.
         UnknownName: for a parameter that is not there.
     """
     over, at = theta(system, parameters), point(system, q0, v0, u, [], 0.0)

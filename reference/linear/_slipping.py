@@ -1,8 +1,9 @@
 """Friction on the way of a motion's derivatives: directions of slip, what is grazed, and which events have a cause.
 
-Where a contact comes to slide out of sticking nothing jumps, and its saltation matrix is the identity. Where a slip
-stops, the force along it jumps; what lies across it has died out by then, since friction turns a slip at a rate of
-mu lam_n/(m |v_t|). Deviations by which a contact that sticks would slip die out within times of their own size.
+Where a contact comes to slide out of sticking nothing jumps, and its saltation matrix is the
+identity. Where a slip stops, the force along it jumps; what lies across it has died out by then,
+since friction turns a slip at a rate of mu lam_n/(m |v_t|). Deviations by which a contact that
+sticks would slip die out within times of their own size.
 """
 
 from __future__ import annotations

@@ -32,7 +32,8 @@ class Trim:
         active (na,): these rows.
         residual: largest part of an equation's terms that is left.
         outcome: FINISHED; STEP_LIMIT without an equilibrium nearby; ILL_POSED or NOT_FINITE on the way.
-        pulling: active rows that would pull though they may not: the equilibrium exists for the equations alone.
+        pulling: active rows that would pull though they may not: the equilibrium exists for the
+            equations alone.
     """
 
     q: Floats
@@ -53,9 +54,9 @@ def trim(
 ) -> Trim:  # fmt: skip
     """Solve f(q, v, u) + H_A^T lam = 0 with h_A = 0 and H_A v = 0 by the damped method of Gauss and Newton.
 
-    Steps are the smallest that satisfy the linearised equations, so what they leave open stays as given. A row without
-    stiffness (a0 = a2 = 0, a slip row) has no h of its own. Contacts that slide push by mu lam_n against their
-    velocity; whether those that stick can bear what they must, `linearise` says.
+    Steps are the smallest that satisfy the linearised equations, so what they leave open stays as given.
+    A row without stiffness (a0 = a2 = 0, a slip row) has no h of its own. Contacts that slide push by mu
+    lam_n against their velocity; whether those that stick can bear what they must, `linearise` says.
 
     Args:
         system: the mechanism.

@@ -1,6 +1,7 @@
 """Forces that were not measured: which are looked for, in what record, and how they are given back.
 
-Unknown forces F are inputs of the mechanism (a force on the flange) or multipliers of rows whose law is not trusted:
+Unknown forces F are inputs of the mechanism (a force on the flange) or multipliers of rows whose
+law is not trusted:
 
     M v' = f(q, v, u + F) + H_A^T lam_A + H_F^T F        lam_A from the laws of the active rows
 """
@@ -32,8 +33,8 @@ class Estimate:
         force (N, k): the inputs asked for, then the multipliers asked for.
         covariance (N, k, k): of the force.
         q, v (N, n): the motion that goes with it.
-        innovation (N, ny): measurement minus its prediction over the deviation expected; white and of unit size where
-            model and noise are right. Empty for `balanced`.
+        innovation (N, ny): measurement minus its prediction over the deviation expected; white
+            and of unit size where model and noise are right. Empty for `balanced`.
     """
 
     t: Floats

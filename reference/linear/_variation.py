@@ -1,7 +1,7 @@
 """The right-hand side in one mode set with its derivatives by the state and by parameters, and what happens at events.
 
-At an event g(x, theta) = 0 with x+ = R(x-, theta) the derivative S of the motion jumps (Leine and Nijmeijer 2004,
-chapter 7; R is the identity except at a frozen collision):
+At an event g(x, theta) = 0 with x+ = R(x-, theta) the derivative S of the motion jumps (Leine and
+Nijmeijer 2004, chapter 7; R is the identity except at a frozen collision):
 
     S+ = R_x S- + R_theta + (R_x f- - f+) dtau        dtau = -(g_x S- + g_theta)/(g_x f-)
 """

@@ -32,45 +32,47 @@ def linearise(
 ) -> LinearModel:  # fmt: skip
     """First-order model dx' = A dx + B du, dy = C dx + D du of v' = M^-1 (f + H_A^T lam) about a state, lam eliminated.
 
-    The derivatives are exact (complex step through the kernels); time is frozen at t. It describes small motions about
-    an equilibrium; about a moving state it is the tangent of the right-hand side there. A compiled sampled controller
-    (`System.control`) is not part of it.
+    The derivatives are exact (complex step through the kernels); time is frozen at t. It
+    describes small motions about an equilibrium; about a moving state it is the tangent of the
+    right-hand side there. A compiled sampled controller (`System.control`) is not part of it.
 
-    Where q' is not v (quaternions) it lives on the tangent space: n coordinates dq that change as the velocities act,
-    for a quaternion the rotation vector from q in body axes, so that dq' = dv - v x dq about a turning state.
+    Where q' is not v (quaternions) it lives on the tangent space: n coordinates dq that change as
+    the velocities act, for a quaternion the rotation vector from q in body axes, so that dq' = dv
+    - v x dq about a turning state.
 
     Activations of actuators are states behind q and v. Where a force or a control is beyond its bounds, or an
     activation leans on an end of its range, the model is that side's: small motions that stay there.
 
-    Contacts with friction that are on stick, unless they are among `sliding`: small motions keep them below their
-    bounds. Those that slide push by mu lam_n against their velocity, wherever that turns. What holds a load together
-    with others while none of them slides needs no part of its own, but has no lam.
+    Contacts with friction that are on stick, unless they are among `sliding`: small motions keep them
+    below their bounds. Those that slide push by mu lam_n against their velocity, wherever that turns. What
+    holds a load together with others while none of them slides needs no part of its own, but has no lam.
 
     Args:
         system: the mechanism with the law of its rows.
         q: positions (nq,).
         v: velocities (n,), zero if not given.
         u: inputs (nu,), zero if not given; without those that stand for activations.
-        active: rows that are on, all others are free; those that are always on (not unilateral), if not given.
-            Tangential rows are on with their normal rows, and rows with dry friction always.
+        active: rows that are on, all others are free; those that are always on (not unilateral), if not
+            given. Tangential rows are on with their normal rows, and rows with dry friction always.
         sliding: which of these slide, by normal rows and by rows with dry friction of their own.
-        outputs: which of "q", "v", "gap", "lam" make up y, in this order, gap and lam of every row; all of them if not
-            given, but lam where rows share their load.
-        reduce: hold the active rows at rest (dh = 0, dh' = 0) instead of following their law: a minimal set of states
-            without the law's own poles (Baumgarte's double pole of a closed loop, say).
+        outputs: which of "q", "v", "gap", "lam" make up y, in this order, gap and lam of every
+            row; all of them if not given, but lam where rows share their load.
+        reduce: hold the active rows at rest (dh = 0, dh' = 0) instead of following their law: a minimal
+            set of states without the law's own poles (Baumgarte's double pole of a closed loop, say).
         names: of the coordinates (n,); "q[0]", ..., or "dq[0]", ... on a tangent space, if not given.
         t: time, s.
         colliding: active rows that follow their fast constants (COLLISION).
         activations: of the actuators that have one (na,); those of the start if not given.
 
     Returns:
-        x = (q, v, a), or the part of it that remains; inputs "u[0]", ...; a velocity is named as its coordinate,
-        primed, an activation "a[0]".
+        x = (q, v, a), or the part of it that remains; inputs "u[0]", ...; a velocity is named as
+        its coordinate, primed, an activation "a[0]".
 
     Raises:
-        SceneError: for a state of another shape, rows that do not exist, that are redundant here, or, with `reduce`,
-            that move; and where friction has no derivative: a contact sticks that bears all that it can, slides at no
-            speed, jams, or shares with others a load of which the law leaves open what each of them bears.
+        SceneError: for a state of another shape, rows that do not exist, that are redundant here,
+            or, with `reduce`, that move; and where friction has no derivative: a contact sticks
+            that bears all that it can, slides at no speed, jams, or shares with others a load of
+            which the law leaves open what each of them bears.
         UnknownName: for another output.
     """
     acts = driven(system, u, activations, t)
@@ -113,8 +115,8 @@ def point(
     """Where to linearise, checked; `driven` where activations are known.
 
     Raises:
-        SceneError: for a state of another shape, rows that do not exist, rows that collide or slide without being on,
-            rows that slide while they share a load, or kernels that are not analytic.
+        SceneError: for a state of another shape, rows that do not exist, rows that collide or slide
+            without being on, rows that slide while they share a load, or kernels that are not analytic.
     """
     check_held(system, driven=driven)
     on = np.flatnonzero(np.asarray(system.unilateral) == 0).tolist() if active is None else active

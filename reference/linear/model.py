@@ -142,12 +142,14 @@ class LinearModel:
     def restricted(self, conditions: ArrayLike, tolerance: float = 1e-9, size: ArrayLike | None = None) -> LinearModel:
         """The same model on the subspace conditions @ dx = 0, which the dynamics must not leave.
 
-        The states that remain are some of the present ones, chosen by pivoting so that they determine the others well.
+        The states that remain are some of the present ones, chosen by pivoting so that they
+        determine the others well.
 
         Args:
             conditions: (nr, nx); dependent ones are recognised.
             tolerance: part of the terms by which a motion may leave the subspace.
-            size: (nx, nx + nu), size of the terms that make up A and B; what they have become in A and B if not given.
+            size: (nx, nx + nu), size of the terms that make up A and B; what they have become in
+                A and B if not given.
 
         Raises:
             SceneError: if the dynamics or the inputs leave the subspace.

@@ -1,11 +1,13 @@
 """Torque that balances the ball, snatches a gap under it, and damps it in the centre.
 
-The ball rolls on a face of radius R, rho = R + r outside or R - r inside, at the angle b; k = J/r^2 and kk = k/mb:
+The ball rolls on a face of radius R, rho = R + r outside or R - r inside, at the angle b; k =
+J/r^2 and kk = k/mb:
 
     (mb + k) rho b'' = -mb g cos b + k R theta''         Jm theta'' = u - k R (R theta'' - rho b'')
 
-To give b'' = w the maze needs theta'' = ((1 + kk) rho w + g cos b)/(kk R). With eps the angle from the equilibrium
-(top, sg = 1, or bottom, sg = -1) and the flat output's rate y' = kk R theta' - (1 + kk) rho b', whose y'' = g cos b,
+To give b'' = w the maze needs theta'' = ((1 + kk) rho w + g cos b)/(kk R). With eps the angle
+from the equilibrium (top, sg = 1, or bottom, sg = -1) and the flat output's rate y' = kk R theta'
+- (1 + kk) rho b', whose y'' = g cos b,
 
     w = -k2 b' - k1 eps + sg k0 (y' - kk R omega)/g
 

@@ -25,9 +25,10 @@ INNER, OUTER, GAPS, REACH, PHASE = range(STRIDE)
 """Columns of the table: a ring in a line, innermost first, and the wall as a ring without gaps."""
 
 CHANNEL, BELOW, ABOVE, MODE, TARGET, TOUCHING, ANGLE, FROM_BELOW, FROM_ABOVE = range(-9, 0)
-"""Channel i lies outside ring i - 1. Sectors below and above: a gap's number, or SOLID. Mode of the controller.
-Latched: the angle of the maze that the snatch aims at; whether the ball touches a face; the ball's angle when it last
-entered a sector, and how far it was then from the middles of the sectors below and above, plus the maze's angle."""
+"""Channel i lies outside ring i - 1. Sectors below and above: a gap's number, or SOLID. Mode of
+the controller. Latched: the angle of the maze that the snatch aims at; whether the ball touches a
+face; the ball's angle when it last entered a sector, and how far it was then from the middles of
+the sectors below and above, plus the maze's angle."""
 SOLID = -1
 DISCRETE, LATCHED = 4, 5
 

@@ -1,11 +1,11 @@
 """What changes at once in the ball maze: channel, sectors, the controller's mode, and whose contact a row is.
 
-A ball that rolls over the edge of a gap keeps its contact: the row of the face hands its mode to the row of the tip
-there, and back. In a gap the ball's centre passes the circle of the tips' centres: the ring below becomes the ring
-above, and the tips keep their modes in the other slots.
+A ball that rolls over the edge of a gap keeps its contact: the row of the face hands its mode to
+the row of the tip there, and back. In a gap the ball's centre passes the circle of the tips'
+centres: the ring below becomes the ring above, and the tips keep their modes in the other slots.
 
-The maze may turn by many gaps within one step. The distance to a sector's edges is therefore counted from where the
-ball entered the sector, without wrapping the maze's angle: once passed, an edge stays passed.
+The maze may turn by many gaps within one step. The distance to a sector's edges is therefore counted from
+where the ball entered the sector, without wrapping the maze's angle: once passed, an edge stays passed.
 """
 
 from __future__ import annotations

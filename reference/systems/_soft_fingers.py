@@ -1,14 +1,14 @@
 """Two fingers with soft pads around a block, their sensors and the tactile loop.
 
-Bortoff, Modeling Contact and Collisions for Robotic Assembly Control, American Modelica Conference 2020. Each pad is a
-small mass before a spring and a damper on its finger; the faces of the pads and the block are what touches.
-With w(t) the offset of the jaw, z a common shift of both fingers and x the flange:
+Bortoff, Modeling Contact and Collisions for Robotic Assembly Control, American Modelica Conference 2020.
+Each pad is a small mass before a spring and a damper on its finger; the faces of the pads and the block
+are what touches. With w(t) the offset of the jaw, z a common shift of both fingers and x the flange:
 
     fL = kp (x + z - w - l/2 - pL) + cp (x' + z' - w' - pL')      mp pL'' = fL - lam_L      hL = b - l/2 - pL
     fR = kp (x + z + w + l/2 - pR) + cp (x' + z' + w' - pR')      mp pR'' = fR + lam_R      hR = pR - b - l/2
 
-A sensor reads y' = ks (lam - y). No force may depend on lam, so the state carried is s_L = y_L + ks mp pL' and
-s_R = y_R - ks mp pR', for which the pads' equations of motion give, exactly and in every mode,
+A sensor reads y' = ks (lam - y). No force may depend on lam, so the state carried is s_L = y_L + ks mp
+pL' and s_R = y_R - ks mp pR', for which the pads' equations of motion give, exactly and in every mode,
 
     s_L' = ks (fL - y_L)         s_R' = ks (-fR - y_R)
 

@@ -1,13 +1,13 @@
 """A planar chain of links hung from a fixed pivot, in maximal coordinates: every joint is two constraint rows.
 
-q = (x_1, z_1, th_1, x_2, z_2, th_2, ...): centre of mass of each link (z up) and its angle from the upright
-vertical, so that it hangs at pi. With e = (sin th, cos th) along the link, a from its pivot to its centre and L to the
-next pivot,
+q = (x_1, z_1, th_1, x_2, z_2, th_2, ...): centre of mass of each link (z up) and its angle from
+the upright vertical, so that it hangs at pi. With e = (sin th, cos th) along the link, a from its
+pivot to its centre and L to the next pivot,
 
     h_i = c_i - a_i e_i - (c_(i-1) + (L_(i-1) - a_(i-1)) e_(i-1))          rows 2 i and 2 i + 1; the first hangs at 0
 
-Joint i brakes the relative rate w = th_i' - th_(i-1)' by k_i w + s_i w/sqrt(w^2 + w_s^2): viscous friction, and
-Coulomb's smoothed over w_s (nothing sticks: well below w_s it is viscous with s_i/w_s).
+Joint i brakes the relative rate w = th_i' - th_(i-1)' by k_i w + s_i w/sqrt(w^2 + w_s^2): viscous
+friction, and Coulomb's smoothed over w_s (nothing sticks: well below w_s it is viscous with s_i/w_s).
 Parameters p = (gravity m/s^2, w_s rad/s, then for each link m kg, a m, L m, I kg m^2, k N m s, s N m).
 Inputs u: a torque on each joint, N m, which turns its link forward and the link before it backward.
 """

@@ -1,14 +1,16 @@
 """A ball among concentric rings that turn about their common axis.
 
-q = (theta, x, y, phi): maze, ball centre, spin of the ball. M = diag(Jm, mb, mb, Jb); gravity along -y; the input is
-the torque on the maze, N m. With s = 1 for a face that the ball is inside of, s = -1 for one that it is outside of,
+q = (theta, x, y, phi): maze, ball centre, spin of the ball. M = diag(Jm, mb, mb, Jb); gravity
+along -y; the input is the torque on the maze, N m. With s = 1 for a face that the ball is inside
+of, s = -1 for one that it is outside of,
 
     h_n = s (R - rho) - r          H_n = [0, -s x/rho, -s y/rho, 0]          H_n' v = -s vt^2/rho
     slip = vt + s r phi' - R theta'  H_t = [-R, -y/rho, x/rho, s r]          H_t' v = -vt vr/rho
     tip: h = |p - c(theta)| - w/2 - r
 
-with vt = (x y' - y x')/rho and vr = (x x' + y y')/rho. Eight rows serve any number of rings: see `_maze_layout`. The
-slip rows stand last and may be left out; they have no position, so their gap is 0 and its rate the slip.
+with vt = (x y' - y x')/rho and vr = (x x' + y y')/rho. Eight rows serve any number of rings: see
+`_maze_layout`. The slip rows stand last and may be left out; they have no position, so their gap
+is 0 and its rate the slip.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Planar pendulums side by side: q_i = angle of string i, counter-clockwise from hanging.
 
-Ball i is a point mass at c_i = (i D + L sin q_i, -L cos q_i) with a circle of radius r around it, D = 2 r + gap the
-distance of the pivots. With a = (q_i + q_(i+1))/2, b = (q_(i+1) - q_i)/2:
+Ball i is a point mass at c_i = (i D + L sin q_i, -L cos q_i) with a circle of radius r around it,
+D = 2 r + gap the distance of the pivots. With a = (q_i + q_(i+1))/2, b = (q_(i+1) - q_i)/2:
 
     |d|^2 = |c_(i+1) - c_i|^2 = D^2 + X          X = 4 L sin b (D cos a + L sin b)
     h = |d| - 2 r = (gap (4 r + gap) + X) / (|d| + 2 r)        no digits are lost where balls hang side by side

@@ -1,7 +1,8 @@
 """A box that falls on a slab which rests on two feet: five constraints between two bodies in a plane.
 
-q = (x, y, th, X, Y, Ph): centre and angle of the box, centre and angle of the slab, counter-clockwise; y is up, the
-floor is y = 0. With n = (-sin Ph, cos Ph), s = (cos Ph, sin Ph) and the lower corners r = R(th) (-+a, -b) of the box:
+q = (x, y, th, X, Y, Ph): centre and angle of the box, centre and angle of the slab,
+counter-clockwise; y is up, the floor is y = 0. With n = (-sin Ph, cos Ph), s = (cos Ph, sin Ph)
+and the lower corners r = R(th) (-+a, -b) of the box:
 
     h1, h2 = Y -+ foot sin Ph - d cos Ph                 feet of the slab on the floor
     h3, h4 = n . d3 - d,  d3 = (x, y) + r - (X, Y)       left and right lower corner of the box on the slab's upper face
@@ -151,8 +152,8 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
     """The mechanism of a case.
 
     Args:
-        parameters: of the case; all of `PARAMETERS` but the inertias, which follow from slab_half_length, m, and the
-            other sizes of two uniform boxes unless they are given.
+        parameters: of the case; all of `PARAMETERS` but the inertias, which follow from
+            slab_half_length, m, and the other sizes of two uniform boxes unless they are given.
         law: of the five rows.
     """
     return System(

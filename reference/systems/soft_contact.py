@@ -1,14 +1,16 @@
 """A block between two soft fingers on one horizontal axis, with tactile feedback.
 
-q = (x flange, pL, pR faces of the pads, b block, I, SL, SR, Z). The last four carry the controller and the sensors:
+q = (x flange, pL, pR faces of the pads, b block, I, SL, SR, Z). The last four carry the
+controller and the sensors:
 
     I = INT (x_ref - x), so I' = e is the error and x_ref = I' + x;  I'' = k (y_R - y_L) - x'
     SL' = s_L, SR' = s_R of `_soft_fingers`;  Z' = z, the shift of the fingers, and z' = u + probe sin(probe_rate t)
 
-so that every equation keeps the form M v' = f + H^T lam; the positions SL, SR, Z themselves act on nothing. The flange
-obeys mf x'' = mf (ki I + kp e + kd (share x_ref' - x')) - fL - fR, the block mb b'' = lam_L - lam_R - bt b'.
-Parameters p are those of `PARAMETERS`; input u = velocity of the fingers, m/s. Kinetic energy is that of the four
-bodies; the pads' springs are tied to the moving jaws, so their work counts as the inputs'.
+so that every equation keeps the form M v' = f + H^T lam; the positions SL, SR, Z themselves act
+on nothing. The flange obeys mf x'' = mf (ki I + kp e + kd (share x_ref' - x')) - fL - fR, the
+block mb b'' = lam_L - lam_R - bt b'. Parameters p are those of `PARAMETERS`; input u = velocity
+of the fingers, m/s. Kinetic energy is that of the four bodies; the pads' springs are tied to the
+moving jaws, so their work counts as the inputs'.
 """
 
 from __future__ import annotations

@@ -1,16 +1,17 @@
 """A delta robot with two soft fingers and a free block on a table, with tactile feedback.
 
-q = (nine angles, pL, pR, S, block b1 b2 b3, I1, I2, I3): pads move along x on the flange, the block has three
-translations, z points down. As in `soft_contact`, but for the sensors, of which the loop needs the difference alone:
+q = (nine angles, pL, pR, S, block b1 b2 b3, I1, I2, I3): pads move along x on the flange, the
+block has three translations, z points down. As in `soft_contact`, but for the sensors, of which
+the loop needs the difference alone:
 
     S' = s = s_R - s_L, so that y_R - y_L = s + ks mp (pL' + pR')     s' = -ks (fL + fR + y_R - y_L)
     I = INT (r - z) of the flange z, I' = e its error, I'' = r' - z', with r1' = k (y_R - y_L), r2 = 0, and r3 a path
     that comes down, waits and rises
 
-Motor torques tau = My Jy^-1 (ki I + kp I' + kd I'' + r'') + tau_g linearise the flange's motion with the exact My and
-without terms in the velocities; r1'' is left out. Forces of the pads act on the flange through Jv^T.
-Rows: the six closures, left pad, right pad, table. Inputs u = a force on the flange, N.
-Parameters p: those of the robot and its (idle) servos, of `_soft_fingers`, and `PATH`.
+Motor torques tau = My Jy^-1 (ki I + kp I' + kd I'' + r'') + tau_g linearise the flange's motion with
+the exact My and without terms in the velocities; r1'' is left out. Forces of the pads act on the
+flange through Jv^T. Rows: the six closures, left pad, right pad, table. Inputs u = a force on the
+flange, N. Parameters p: those of the robot and its (idle) servos, of `_soft_fingers`, and `PATH`.
 """
 
 from __future__ import annotations
@@ -180,7 +181,8 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
     """The mechanism of a case.
 
     Args:
-        parameters: of the case: the robot's, and the names of `_soft_fingers.NAMES` and `PATH`, with kstar for k.
+        parameters: of the case: the robot's, and the names of `_soft_fingers.NAMES` and `PATH`,
+            with kstar for k.
         law: of the nine rows.
     """
     from crossbody.reference import System

@@ -1,7 +1,7 @@
 """Frequency responses of a case about an equilibrium, in the modes of that equilibrium.
 
-Today the soft contact: from the velocity of the fingers to the difference of the contact forces and to the velocity of
-the block, held by both fingers, with and without tactile feedback.
+Today the soft contact: from the velocity of the fingers to the difference of the contact forces
+and to the velocity of the block, held by both fingers, with and without tactile feedback.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def table(curves: Sequence[Curve], omega: ArrayLike) -> pd.DataFrame:
 def poles(curves: Sequence[Curve]) -> pd.DataFrame:
     """Every eigenvalue of every curve, 1/s: one row a value.
 
-    Two stand at 0 and say nothing about stability: the shift of the fingers, which is what the input drives, and the
-    quantity that the tactile loop keeps.
+    Two stand at 0 and say nothing about stability: the shift of the fingers, which is what the
+    input drives, and the quantity that the tactile loop keeps.
     """
     rows = [
         {"mode": curve.mode, "kstar": curve.kstar, "real": pole.real, "imag": pole.imag}

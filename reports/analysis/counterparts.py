@@ -1,8 +1,9 @@
 """The same linear models by engines: what each way of an engine makes of an equilibrium, beside the reference's.
 
-Two numbers judge a way. The slope: the largest difference of d(v')/d(q, v), row by row, as a part of the row. The
-poles: of the model without the rows that are held, matched to the reference's and compared as a part of their modulus;
-of poles that nearly coincide the mean, which is well conditioned where each alone is not (Kato 1966, II.2).
+Two numbers judge a way. The slope: the largest difference of d(v')/d(q, v), row by row, as a part
+of the row. The poles: of the model without the rows that are held, matched to the reference's and
+compared as a part of their modulus; of poles that nearly coincide the mean, which is well
+conditioned where each alone is not (Kato 1966, II.2).
 """
 
 from __future__ import annotations

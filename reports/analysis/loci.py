@@ -18,8 +18,8 @@ from crossbody.reports.analysis.places import Place, places
 LOCUS = ("place", "parameter", "value", "branch", "real", "imag")
 LIMITS = ("place", "parameter", "value", "unstable", "frequency")
 AT_REST = 1e-7
-"""Part of the fastest pole below which one stands at 0 and says nothing about stability: what a loop integrates, and
-what nothing depends on. Two of them together are scattered by the root of rounding."""
+"""Part of the fastest pole below which one stands at 0 and says nothing about stability: what a loop
+integrates, and what nothing depends on. Two of them together are scattered by the root of rounding."""
 
 
 class Family:

@@ -123,8 +123,8 @@ def workspace(
         reach: largest |x| of the flange, m.
 
     Returns:
-        Columns x, z, growth (largest real part, 1/s; NaN where the robot does not reach or is singular), unstable
-        (number of poles to the right of 0).
+        Columns x, z, growth (largest real part, 1/s; NaN where the robot does not reach or is
+        singular), unstable (number of poles to the right of 0).
 
     Raises:
         CaseUnsupported: for another mechanism.

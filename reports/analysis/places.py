@@ -1,9 +1,9 @@
 """Equilibria of a case, each in a mode set, with the linear model there.
 
-The model at a place is minimal: rows that are held stay held, unless their law is what is looked at (a ball in contact,
-soft fingers). What acts from outside on a scene is held at what it is there. A mechanism without a list of places is
-looked at where its run passes: in every mode set that it visits. What slides, or is driven, stands nowhere: its model
-is the tangent of the right-hand side where the run is.
+The model at a place is minimal: rows that are held stay held, unless their law is what is looked at (a
+ball in contact, soft fingers). What acts from outside on a scene is held at what it is there. A mechanism
+without a list of places is looked at where its run passes: in every mode set that it visits. What slides,
+or is driven, stands nowhere: its model is the tangent of the right-hand side where the run is.
 """
 
 from __future__ import annotations

@@ -28,8 +28,9 @@ PARTS = {
 class Truths:
     """The truth of the equations that an engine follows, each worked out once.
 
-    An engine without ballistic memory converges, but to another motion than the case's: judged against that, its error
-    has a floor whatever the step. So its run time is shown over its distance to what it does converge to.
+    An engine without ballistic memory converges, but to another motion than the case's: judged
+    against that, its error has a floor whatever the step. So its run time is shown over its
+    distance to what it does converge to.
     """
 
     def __init__(self, case: Case) -> None:
@@ -74,8 +75,8 @@ def errors(truth: Truth, run: Trajectory, case: Case) -> dict[str, float]:
 def between(case: Case, pick: Pick, run: Any, steps: Trajectory, truth: Truth) -> float:
     """Error of the position on one grid for all engines: what a user sees between steps.
 
-    Where an engine can be asked for instants it is asked for these; else a cubic through places and rates of its steps
-    stands for what lies between them.
+    Where an engine can be asked for instants it is asked for these; else a cubic through places
+    and rates of its steps stands for what lies between them.
     """
     grid = np.linspace(0.0, case.t_end, GRID)
     if "samples" in run.settings:

@@ -25,11 +25,12 @@ def headline(rows: pd.DataFrame) -> pd.DataFrame:
         rows: as of `crossbody.reports.bench.measure.bench`, with those of the compiled reference.
 
     Returns:
-        ratio: of the runs themselves; ratio_call: of the whole calls from Python; ratio_native: of the engine's own
-        loop over the same steps, without what is `interpreted` in its run; least_ratio: the smallest of all
-        error levels that the engine reaches, which is that of least_error; ahead: "yes" where the reference is
-        faster at every one of them, else "no" and `says` why; nothing where an engine reaches none. An error below
-        rounding, or below what the truth is known to, counts as that.
+        ratio: of the runs themselves; ratio_call: of the whole calls from Python; ratio_native:
+            of the engine's own
+        loop over the same steps, without what is `interpreted` in its run; least_ratio: the smallest
+        of all error levels that the engine reaches, which is that of least_error; ahead: "yes" where
+        the reference is faster at every one of them, else "no" and `says` why; nothing where an engine
+        reaches none. An error below rounding, or below what the truth is known to, counts as that.
     """
     found = [row for _, group in rows.groupby("case", sort=False) for row in _case(group)]
     return pd.DataFrame(found, columns=COLUMNS)

@@ -1,8 +1,9 @@
 """Run time against error over ladders of tolerances and steps (docs/explanation/verdicts.md).
 
-Models are built and warmed before the clock; the runs are interleaved, one round after another, so that a slow minute
-of the machine falls on all of them. Every row has two times: the run itself, as the engine's adapter clocks it, and
-the whole call from Python, whose excess is the cost of the call and of the trajectory that it builds.
+Models are built and warmed before the clock; the runs are interleaved, one round after another,
+so that a slow minute of the machine falls on all of them. Every row has two times: the run
+itself, as the engine's adapter clocks it, and the whole call from Python, whose excess is the
+cost of the call and of the trajectory that it builds.
 """
 
 from __future__ import annotations
@@ -150,7 +151,8 @@ def bench(
         picks: engines and profiles; what is not installed or does not know the mechanism has no row.
         effort: how much is measured, or the number of repeats.
         tell: is told what is being done, once an engine.
-        limit: time after which an engine that has not come back is ended with its process, s; from the command line.
+        limit: time after which an engine that has not come back is ended with its process, s;
+            from the command line.
 
     Returns:
         One row a rung, columns `COLUMNS`; errors and honesty (error over tolerance) are ratios, event times in s;

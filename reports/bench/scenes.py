@@ -77,7 +77,8 @@ def effort(full: bool, every_rung: bool, repeats: int | None, each: float = math
         full: every case, or the quick scenes.
         every_rung: whether no rung is left out.
         repeats: timed runs of each rung, if it was said.
-        each: time for an engine on a scene, s: half of it to climb its ladder, half for its share of the rounds.
+        each: time for an engine on a scene, s: half of it to climb its ladder, half for its share
+            of the rounds.
     """
     chosen = FULL_EFFORT if full else QUICK_EFFORT
     chosen = replace(chosen, every=1) if every_rung else chosen

@@ -194,6 +194,7 @@ def measure(repeats: int) -> pd.DataFrame:
         repeats: interleaved runs of each, the shortest of which counts.
 
     Returns:
-        value and limit are ratios or counts; held is whether the value is within its limit (always, without one).
+        value and limit are ratios or counts; held is whether the value is within its limit
+        (always, without one).
     """
     return pd.DataFrame([row for lever in LEVERS for row in lever(repeats)], columns=COLUMNS)

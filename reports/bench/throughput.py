@@ -59,7 +59,8 @@ def reference(count: int, threads: int, rtol: float = RTOL) -> float:
 def mujoco(count: int, threads: int, integrator: str = "Euler") -> float:
     """Runs a second of the same drops by MuJoCo's batch, stepped in its own threads at 1 ms.
 
-    Its batch takes no Python callback, so the cubic part of the law is missing: this is less work than the case's.
+    Its batch takes no Python callback, so the cubic part of the law is missing: this is less work
+    than the case's.
 
     Args:
         count: runs.

@@ -17,8 +17,8 @@ from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.runs import choice, jobs
 
 NEAR = (0.7, 1.4)
-"""Tolerances of the runs beside a stored one, over its own: how far one run of adaptive steps is off is chance, and
-moves tenfold with the last digit; the largest of three does not."""
+"""Tolerances of the runs beside a stored one, over its own: how far one run of adaptive steps is
+off is chance, and moves tenfold with the last digit; the largest of three does not."""
 
 
 def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations, float]]:

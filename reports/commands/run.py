@@ -34,10 +34,11 @@ def run(
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
-    `cases` are those of `names`, with the parameters of `pairs`; `against` is the folder of an earlier run, which may
-    be `out` itself; `others` those of studies beside this one; `limit` is the time that an engine may take for one
-    case, s; `strict` makes a number wrong that left its regression band; `at_once` is how many cases are run at once,
-    in processes of their own; `budget` is how long the tightest run of a scene may take, s.
+    `cases` are those of `names`, with the parameters of `pairs`; `against` is the folder of an
+    earlier run, which may be `out` itself; `others` those of studies beside this one; `limit` is
+    the time that an engine may take for one case, s; `strict` makes a number wrong that left its
+    regression band; `at_once` is how many cases are run at once, in processes of their own;
+    `budget` is how long the tightest run of a scene may take, s.
 
     Raises:
         CrossbodyError: for wrong use, before anything is written.

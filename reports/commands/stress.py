@@ -75,7 +75,8 @@ def plan(ask: Ask) -> list[Spec]:
     """Every run that is asked for.
 
     Raises:
-        UnknownName, InvalidValue: for a suite, an engine or a number that does not exist; grids that contradict.
+        UnknownName, InvalidValue: for a suite, an engine or a number that does not exist; grids
+            that contradict.
     """
     if ask.runs is not None and ask.runs < 1:
         raise InvalidValue(f"--runs is {ask.runs}; a sweep needs at least 1.")

@@ -106,10 +106,10 @@ def explained(
 ) -> list[Row]:
     """Return the rows, those that are wrong with the feature that is to blame and where that stands.
 
-    To blame is a feature that the file uses, which the importer fails in its smallest file, and without which it reads
-    the file's quantity as the file then says; or two of them together, where neither does it alone. Named as a guess is
-    what it fails in every file, or the nearest where only all of them do it, or the file in plainer words; what does it
-    though its smallest file is read; and what cannot be left out.
+    To blame is a feature that the file uses, which the importer fails in its smallest file, and without
+    which it reads the file's quantity as the file then says; or two of them together, where neither does it
+    alone. Named as a guess is what it fails in every file, or the nearest where only all of them do it, or
+    the file in plainer words; what does it though its smallest file is read; and what cannot be left out.
 
     Args:
         path: of the file.

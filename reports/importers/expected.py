@@ -57,7 +57,8 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
     Args:
         scene: what the file means.
         job: of `job_of`.
-        touching: names of the shapes that may touch something; without them neither shapes nor contacts are told.
+        touching: names of the shapes that may touch something; without them neither shapes nor
+            contacts are told.
     """
     states = [
         (np.concatenate([np.zeros(0), *state["q"]]), np.concatenate([np.zeros(0), *state["v"]]))

@@ -1,7 +1,8 @@
 """An MJCF in plain words: everything said where it counts, in the plainest of its forms.
 
-Classes and includes are written out for joints, geoms and sites, orientations as unit quaternions, angles in radians,
-inertias given, <frame>s and poses of bodies that are fixed to the world put into what stands on them.
+Classes and includes are written out for joints, geoms and sites, orientations as unit
+quaternions, angles in radians, inertias given, <frame>s and poses of bodies that are fixed to the
+world put into what stands on them.
 """
 
 from __future__ import annotations

@@ -20,7 +20,8 @@ class Answers:
     """The truth at instants: every metric asks for it at those of a run, and parts of an error at those of five.
 
     Args:
-        integrate: the motion at nondecreasing instants; one asked for twice is told from both sides of an event.
+        integrate: the motion at nondecreasing instants; one asked for twice is told from both
+            sides of an event.
     """
 
     def __init__(self, integrate: Callable[[Floats], Trajectory]) -> None:

@@ -1,6 +1,7 @@
 """The parity audit: whether the same physics reached every engine.
 
-Numbers are laid side by side; M, bias, H and lam are evaluated at the same random states where an engine shows them.
+Numbers are laid side by side; M, bias, H and lam are evaluated at the same random states where an
+engine shows them.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ class AuditRow:
     Attributes:
         quantity: what is compared.
         mine, theirs: the values in words; "20 states" for a function.
-        difference: largest difference over the largest value; NaN if the engine's contract says that it does not show
-            it, infinite if it should.
+        difference: largest difference over the largest value; NaN if the engine's contract says
+            that it does not show it, infinite if it should.
         tolerance: how much is the same physics.
     """
 

@@ -49,8 +49,8 @@ GROWING = frozenset({
     "slip_times", "stick_times", "friction_impulse", "friction_work",
     "largest position (importer)", "largest event_times (importer)",
 })  # fmt: skip
-"""Metrics that compare a motion with the truth's, or those of two readers of a file: rounding grows as the motion has
-it."""
+"""Metrics that compare a motion with the truth's, or those of two readers of a file: rounding
+grows as the motion has it."""
 WIDEST = 1e-3
 """To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion."""
 LARGEST = "largest"
@@ -73,7 +73,8 @@ class Entry:
         skipped: why, in one sentence.
         audit: what reached the engine beside the reference.
         study: runs of the same engine with other steps or tolerances, which tell the parts of its error.
-        stepped: ends of the run's own steps, s, where `run` was asked for other instants; None where they are its own.
+        stepped: ends of the run's own steps, s, where `run` was asked for other instants; None
+            where they are its own.
         own: truth of the equations that the engine really integrates; None where they are the case's own.
         hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
         crashed: what it threw, where it did not come back with an outcome.
@@ -303,7 +304,8 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
     """Metric -> deviation of every number of a run, judged or not, to be stored; NaN for one that it does not have.
 
-    The audit is stored beside them and does not stand before them: what is known of an engine is not known yet.
+    The audit is stored beside them and does not stand before them: what is known of an engine is
+    not known yet.
     """
     rows = verdicts(case, replace(entry, audit=()), truth, "")
     claims = {claim.metric: claim for claim in case.claims}

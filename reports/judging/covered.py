@@ -24,7 +24,8 @@ def covered(case: Case, budget: float) -> Case:
         budget: time that a run may take, s.
 
     Raises:
-        CaseUnsupported: if shapes of the file surely meet whose contacts no row stands for: nothing could be judged.
+        CaseUnsupported: if shapes of the file surely meet whose contacts no row stands for:
+            nothing could be judged.
     """
     if not case.file:
         return case

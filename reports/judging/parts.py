@@ -1,7 +1,8 @@
 """An engine's error in parts: of its importer, of its model, of its step.
 
-Errors are vectors (samples, components), relative as in the metric `position`, on the truth's clock: events are laid on
-each other, so that behind an event that moved states are compared at equal time since it. At every sample
+Errors are vectors (samples, components), relative as in the metric `position`, on the truth's
+clock: events are laid on each other, so that behind an event that moved states are compared at
+equal time since it. At every sample
 
     whole = importer + model + step
 
@@ -9,10 +10,11 @@ each other, so that behind an event that moved states are compared at equal time
     model       the engine's converged motion against the truth
     step        the engine at its step against its own converged motion
 
-The converged motion is the truth of the equations that the engine follows, where those are known; else it follows from
-three steps or more, each half of the one before, by the order that they show. Without one nothing is extrapolated: it
-is the finest run, known to what further differences sum to where they fall, else it is not known. Of an engine with a
-tolerance instead of a step it is the run at the tightest. What a part is known to stands beside it.
+The converged motion is the truth of the equations that the engine follows, where those are known;
+else it follows from three steps or more, each half of the one before, by the order that they
+show. Without one nothing is extrapolated: it is the finest run, known to what further differences
+sum to where they fall, else it is not known. Of an engine with a tolerance instead of a step it
+is the run at the tightest. What a part is known to stands beside it.
 """
 
 from __future__ import annotations
@@ -50,9 +52,11 @@ class Study:
 
     Attributes:
         setting: what differs between them: "dt" or "rtol".
-        sizes: of it, falling: three steps or more in the ratio 2, or two tolerances, the last of which is the tightest.
+        sizes: of it, falling: three steps or more in the ratio 2, or two tolerances, the last of
+            which is the tightest.
         runs: one for each.
-        built: the engine at its own settings on the model that is built from the scene; None without its own reader.
+        built: the engine at its own settings on the model that is built from the scene; None
+            without its own reader.
         why: why there are no runs, in a sentence.
         why_built: why there is no such run although the engine has a reader of its own.
     """
@@ -169,8 +173,8 @@ def _step(
 def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, Sequence[float]]:
     """Return by how much differences fall from one pair of runs to the next, and the three steps that tell it.
 
-    It is the factor that makes both fields of differences most alike, of the finest three runs that differ by more
-    than rounding; infinite where none do.
+    It is the factor that makes both fields of differences most alike, of the finest three runs
+    that differ by more than rounding; infinite where none do.
 
     Args:
         errors: of three runs or more (samples, components), the coarsest first.
@@ -199,7 +203,8 @@ def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, S
 def remaining(errors: Sequence[Floats]) -> float:
     """Return what all further differences sum to if each falls as those of the runs do; NaN where these do not fall.
 
-    Events that a step rounds to its own instants leave differences that fall with the step and are no power of it.
+    Events that a step rounds to its own instants leave differences that fall with the step and
+    are no power of it.
 
     Args:
         errors: of four runs or more (samples, components), the coarsest first; of fewer it is NaN.
@@ -216,7 +221,8 @@ def _listed(sizes: Sequence[float]) -> str:
 def extrapolated(errors: Sequence[Floats], ratio: float) -> tuple[Floats, float]:
     """Return the limit of three runs whose differences fall by a ratio, and what it is known to.
 
-    That is the distance between the limits of the coarser pair and of the finer one: what the coarser one is off by.
+    That is the distance between the limits of the coarser pair and of the finer one: what the
+    coarser one is off by.
     """
     coarse, middle, fine = errors
     if math.isinf(ratio):
@@ -232,8 +238,8 @@ def _most(error: Floats) -> float:
 class Positions:
     """Errors of positions of the runs of one engine, at the same samples.
 
-    A rotation is three components, the vector in body axes that leads from the truth's to the run's, rad, in the first
-    three entries of its quaternion.
+    A rotation is three components, the vector in body axes that leads from the truth's to the
+    run's, rad, in the first three entries of its quaternion.
 
     Attributes:
         whole: that of the run that is judged (samples, components).
@@ -282,8 +288,8 @@ class Positions:
     def _lay(self, run: Trajectory) -> Floats:
         """Return the error of a run.
 
-        Between its samples the error is interpolated, which is smaller and smoother than the motion: by a cubic through
-        the rates of both, where positions have rates of their own, else by a straight line.
+        Between its samples the error is interpolated, which is smaller and smoother than the motion: by a
+        cubic through the rates of both, where positions have rates of their own, else by a straight line.
         """
         t = clock(self.truth, run)
         if not len(t) or t[-1] < self.t[-1] - REACHED * self.case.t_end:

@@ -15,16 +15,19 @@ if TYPE_CHECKING:
 
 BUDGET = 5.0  # time that the tightest run of a scene may take, s; its truth is about ten such runs
 COARSE, LEAST, MANY = 1e-9, 50, 20
-"""A scene is followed so tightly as takes up to so many times the steps of a coarse run, or of the least that counts:
-of a method of order 8 the tightest takes 3 times as many, unless rounding is what its errors are made of."""
+"""A scene is followed so tightly as takes up to so many times the steps of a coarse run, or of
+the least that counts: of a method of order 8 the tightest takes 3 times as many, unless rounding
+is what its errors are made of."""
 LADDER = (1.0, 10.0, 100.0, 1000.0)  # tolerances that are tried, in units of `Case.tight`
 BOUNDED = 2  # the first so many of them are left for the next where they take too many steps
 SHORTER = 0.1
-"""Each is left for the next, too, where a run that its budget ends gets less far than this part of the coarse one:
-where stiff contacts slide steps are of low order, and a hundred times as many for four digits more."""
+"""Each is left for the next, too, where a run that its budget ends gets less far than this part
+of the coarse one: where stiff contacts slide steps are of low order, and a hundred times as many
+for four digits more."""
 FEW, FEWEST, MORE, AMPLE = 4, 200, 2, 1.5
-"""Steps that tell what one of an engine costs; how many a run takes at least, with those that choose its method; by how
-much more are tried next; and how much more than may be paid for before a run counts as too dear."""
+"""Steps that tell what one of an engine costs; how many a run takes at least, with those that
+choose its method; by how much more are tried next; and how much more than may be paid for before
+a run counts as too dear."""
 SHORT = {
     Outcome.TIME_LIMIT: "more takes longer than --budget allows",
     Outcome.PAINLEVE: "rigid bodies with dry friction have no motion beyond (Painleve)",
@@ -57,7 +60,8 @@ def followed(case: Case, budget: float | None = None) -> Followed:
 
     Args:
         case: the scene.
-        budget: time that a run may take, s; the horizon ends where it does, or the law. None: the horizon stays.
+        budget: time that a run may take, s; the horizon ends where it does, or the law. None: the
+            horizon stays.
     """
     if not case.general:
         return Followed(case, tight(case))
@@ -111,7 +115,8 @@ def estimated(prepare: Callable[..., Run], part: float, most: float) -> tuple[fl
     Args:
         prepare: prepares the first part of the run, with settings.
         part: of the horizon.
-        most: beyond it the first part is not run either, or not to its end: what it takes is then at least this.
+        most: beyond it the first part is not run either, or not to its end: what it takes is then
+            at least this.
     """
     prepared = prepare()
     if "max_steps" not in prepared.settings:

@@ -1,7 +1,7 @@
 """What a run of this version gave: the size of every known deviation, and the band in which numbers stay.
 
-`stored.json` beside this file is made by one command (`make bands`) and committed; it holds the deviation of every
-number from what is claimed, by case and variant, engine and profile, to three digits.
+`stored.json` beside this file is made by one command (`make bands`) and committed; it holds the
+deviation of every number from what is claimed, by case and variant, engine and profile, to three digits.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def words(settings: Mapping[str, Any]) -> str:
 def deviations(case: Case, entry: Entry, trusted: float) -> Deviations:
     """Metric -> deviation of the stored run with the same parameters and settings; empty where there is none.
 
-    What was compared up to another instant than `trusted`, s, says nothing of this run. A number that the stored run
-    did not have is NaN.
+    What was compared up to another instant than `trusted`, s, says nothing of this run. A number
+    that the stored run did not have is NaN.
     """
     if not abs(compared_until(case) - min(trusted, case.t_end)) <= SAME_END * case.t_end:
         return {}

@@ -37,8 +37,8 @@ STEPS, GROWTH = 1e4, 10.0
 AGREES = STEPS * GROWTH
 """Largest disagreement of the two, in units of the looser tolerance; it is never more than `PARTED`."""
 MULTIPLIED = 1e3
-"""How many times as large an error of the start may have become where a run with the default tolerance is still judged:
-its limits, 1e-6 of a motion, grow no further than to 1e-3."""
+"""How many times as large an error of the start may have become where a run with the default
+tolerance is still judged: its limits, 1e-6 of a motion, grow no further than to 1e-3."""
 GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
 
@@ -48,7 +48,8 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
 
     Args:
         case: the scene.
-        known: the case as far as it is followed, with which motions are compared then; else to its whole horizon.
+        known: the case as far as it is followed, with which motions are compared then; else to
+            its whole horizon.
         budget: by which the time of its witness is measured, s.
 
     Raises:
@@ -167,8 +168,8 @@ def _in_time(case: Case, solver: str, rtol: float, limit: float) -> Trajectory |
 def _witness(case: Case, limit: float) -> Trajectory | str:
     """A scene's motion in Pinocchio, or the reason why there is none.
 
-    Its model is built from the scene; kinematics, forces, rows, location of events and integrator are others' or
-    written apart.
+    Its model is built from the scene; kinematics, forces, rows, location of events and integrator
+    are others' or written apart.
     """
     from crossbody import engines
 
@@ -242,8 +243,8 @@ def _arbitrary(truth: Truth, second: Trajectory, case: Case) -> float:
 def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], limit: float) -> tuple[Floats, Floats]:
     """Instants (n,), s, and by how much more than in free flight errors of a scene's start have grown until then (n,).
 
-    Its velocities are put off, on its rows. A neighbour that gets less far, or takes longer than a limit, s, tells of
-    growth as far as it gets: limits are the stricter for what is not known.
+    Its velocities are put off, on its rows. A neighbour that gets less far, or takes longer than
+    a limit, s, tells of growth as far as it gets: limits are the stricter for what is not known.
     """
     fastest = max(float(np.max(np.abs(truth.v), initial=0.0)), RESTS)  # what balances falls, however slowly
     if not case.general or not truth.outcome.ok or not fastest < math.inf:
@@ -304,7 +305,8 @@ def with_both_sides(run: Trajectory, natural: Trajectory) -> Trajectory:
     """A run sampled at given times, with the states at both sides of an event where an instant was asked for twice.
 
     Args:
-        run: sampled; an event's instant gives the state before it, or after it where its own event came earlier.
+        run: sampled; an event's instant gives the state before it, or after it where its own
+            event came earlier.
         natural: the same run at its own steps, both sides of every event.
     """
     again = np.flatnonzero(run.t[1:] == run.t[:-1]) + 1

@@ -20,8 +20,8 @@ ROUNDING = 1e-12
 IDENTITIES = frozenset(
     {"start_error", "mode_residual", "event_gap", "largest position (importer)", "largest event_times (importer)"}
 )
-"""Metrics that hold a run against itself or the case's own numbers, and what a reader makes of a file: no known
-property of an engine explains them."""
+"""Metrics that hold a run against itself or the case's own numbers, and what a reader makes of a
+file: no known property of an engine explains them."""
 
 
 class Word(StrEnum):
@@ -62,11 +62,13 @@ class Verdict:
         command: what reproduces the row.
         settings: of the engine, in words.
         compared: part of the horizon over which it was measured.
-        band: largest distance from `expected` that is no regression, ten times what a stored run of this version gave;
-            NaN where none is stored.
+        band: largest distance from `expected` that is no regression, ten times what a stored run
+            of this version gave; NaN where none is stored.
         regression: "kept" or "lost" by that band; empty without one.
-        known: what the number is known to, of a part of an error; NaN where nothing is said. One below it is none.
-        where: of what the number is and when, in its own unit, where it is beyond its limit and its metric can say so.
+        known: what the number is known to, of a part of an error; NaN where nothing is said. One
+            below it is none.
+        where: of what the number is and when, in its own unit, where it is beyond its limit and
+            its metric can say so.
     """
 
     case: str
@@ -133,7 +135,8 @@ def explained(limit: Limit, stored: float | None) -> tuple[float, float] | None:
 def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float | None = None) -> tuple[Word, str]:
     """The word and the reason for one number.
 
-    A claim without a limit must come out exactly. What is not finite is outside, even where nothing is judged.
+    A claim without a limit must come out exactly. What is not finite is outside, even where
+    nothing is judged.
 
     Args:
         value: the number.

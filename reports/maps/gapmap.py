@@ -1,7 +1,7 @@
 """The gap map: how far apart balls must hang for an engine to give the ideal pattern, and what energy it makes before.
 
-s = gap sqrt(a0) / v is the gap over the deepest penetration of one pair. From s = 0, where collisions overlap, to s of
-some units, where they are over before the next begins.
+s = gap sqrt(a0) / v is the gap over the deepest penetration of one pair. From s = 0, where
+collisions overlap, to s of some units, where they are over before the next begins.
 """
 
 from __future__ import annotations
@@ -94,7 +94,8 @@ def gap_map(
         tell: is told what is being done, once a line.
 
     Returns:
-        One row a run, columns `COLUMNS`: ratios to the energy, momentum and speed that came in. A line that cannot be
+        One row a run, columns `COLUMNS`: ratios to the energy, momentum and speed that came in. A
+            line that cannot be
         had is one row with its sentence; a run that failed stays, with its outcome.
     """
     rows: list[dict[str, Any]] = []

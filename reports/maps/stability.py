@@ -1,8 +1,8 @@
 """The stability map of the closed-loop ball maze: from which scenes the ball still comes to the centre.
 
-Each point changes the default run in one thing: a bound, a gain, the model that the controller believes in, the
-start, or how it is sampled. What is published of that run stands beside what was found; where a ball
-tumbles through several rings the outcome hangs on the last digits, and nothing is expected.
+Each point changes the default run in one thing: a bound, a gain, the model that the controller believes
+in, the start, or how it is sampled. What is published of that run stands beside what was found; where a
+ball tumbles through several rings the outcome hangs on the last digits, and nothing is expected.
 """
 
 from __future__ import annotations
@@ -100,7 +100,8 @@ def stability_map(
         tell: is told what is being done, once a point.
 
     Returns:
-        One row a run, columns `COLUMNS`: ended is where the run ended, arrival when the ball came to the centre to
+        One row a run, columns `COLUMNS`: ended is where the run ended, arrival when the ball came
+            to the centre to
         stay, s. What an engine cannot run is a row with its sentence.
     """
     rows = []

@@ -1,8 +1,8 @@
 """A run laid beside the truth: events are matched first, the arcs between them compared.
 
-A shift of an impact by 2 ms costs 2 v0 in a raw difference of velocities although nothing else is wrong. So the run's
-clock is stretched, linearly between matched touches, until they stand at the truth's instants; how far they were off
-is a number of its own (metric event_times).
+A shift of an impact by 2 ms costs 2 v0 in a raw difference of velocities although nothing else is
+wrong. So the run's clock is stretched, linearly between matched touches, until they stand at the
+truth's instants; how far they were off is a number of its own (metric event_times).
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ def turns(run: Trajectory) -> list[tuple[float, int, Mode]]:
 def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
     """The truth's time of every sample of the run (n,), s.
 
-    Where lam jumps besides, at `releases` and between stick and slip, is laid on the truth's too if it is asked for.
+    Where lam jumps besides, at `releases` and between stick and slip, is laid on the truth's too
+    if it is asked for.
     """
     start, pairs = float(truth.trajectory.t[0]), matched(truth, run)
     knots = [(b.touch, a.touch) for a, b in pairs]

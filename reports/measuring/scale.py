@@ -10,8 +10,8 @@ from crossbody.cases import Coordinate, Trajectory
 from crossbody.cases.arrays import Floats
 
 RESTS = 1e-4
-"""Coordinates of one unit that all stay below this, in SI, rest: what is left of their motion is known to absolute
-tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hundred of them."""
+"""Coordinates of one unit that all stay below this, in SI, rest: what is left of their motion is known to
+absolute tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hundred of them."""
 
 
 IDLE = 1e-3
@@ -23,9 +23,9 @@ KNOWN = 1e-8
 def energy(run: Trajectory) -> float:
     """Return what energies are measured by, J: the largest kinetic energy, or the swing of the potential.
 
-    A robot that stands sags by its servos at hardly any speed: its energy turns over in springs and weights. Where
-    every coordinate rests, by what it, and what its rows carry, would turn over if they moved by as much as they are
-    measured by themselves, and by what rounding leaves of the largest energy.
+    A robot that stands sags by its servos at hardly any speed: its energy turns over in springs and
+    weights. Where every coordinate rests, by what it, and what its rows carry, would turn over if they
+    moved by as much as they are measured by themselves, and by what rounding leaves of the largest energy.
     """
     known = KNOWN * float(np.max(np.abs(run.energy)))
     moved = _moved(run)
@@ -49,8 +49,8 @@ def least(named: Sequence[Coordinate], rates: bool = False) -> Floats:
 def idle(run: Trajectory) -> float:
     """Return the multiplier, N or N m, below which errors are not measured by what rows carry.
 
-    The force is the energy over the way that it moves things: of what falls, its weight. A robot whose couplings have
-    nothing to hold in free fall has multipliers of 1e-13 N, and an error of as much is none.
+    The force is the energy over the way that it moves things: of what falls, its weight. A robot whose
+    couplings have nothing to hold in free fall has multipliers of 1e-13 N, and an error of as much is none.
     """
     return IDLE * energy(run) / max(_moved(run), RESTS)
 

@@ -1,13 +1,14 @@
 """Energy that a contact law makes where rows are switched (docs/explanation/model.md).
 
-With one a0 the active rows A have the potential 1/2 a0 h_A^T G_A^-1 h_A, G = H M^-1 H^T. Another set of rows at the
-same state has another one, and lam books the difference:
+With one a0 the active rows A have the potential 1/2 a0 h_A^T G_A^-1 h_A, G = H M^-1 H^T. Another
+set of rows at the same state has another one, and lam books the difference:
 
     jump = 1/2 a0 (h_B^T G_B^-1 h_B - h_A^T G_A^-1 h_A)                 from the set A to the set B
 
-Switching on a row j at h_j = 0 gives 1/2 a0 h_A^T [(G_(A+j)^-1)_AA - G_A^-1] h_A >= 0; a row that lets go where its
-lam vanishes gives 0. Unequal a0 have no potential: there is no such number. The sum is all that the law makes where G
-is constant; where G depends on q lam does work besides, O(a0^-1/2) of it: a contact moves q by speed/sqrt(a0).
+Switching on a row j at h_j = 0 gives 1/2 a0 h_A^T [(G_(A+j)^-1)_AA - G_A^-1] h_A >= 0; a row that
+lets go where its lam vanishes gives 0. Unequal a0 have no potential: there is no such number. The
+sum is all that the law makes where G is constant; where G depends on q lam does work besides,
+O(a0^-1/2) of it: a contact moves q by speed/sqrt(a0).
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from crossbody.engines.equations import system_of
 def made(run: Trajectory, case: Case) -> float | None:
     """Sum of the jumps over all instants at which rows are switched, J; NaN if the motion is not finite.
 
-    None where the law has no such potential (unequal a0, a cubic term), where rows are always on or collide in no
-    time, and where the run knows no modes.
+    None where the law has no such potential (unequal a0, a cubic term), where rows are always on
+    or collide in no time, and where the run knows no modes.
     """
     law = case.law
     frozen = case.collisions != "resolved" and bool(law.b0.any())

@@ -29,20 +29,23 @@ class Truth:
         tier: how it is known.
         source: in words, with the agreement of tier C.
         trajectory: the motion, dense enough to plot, both sides of every event.
-        at: the motion at nondecreasing times inside the horizon; an event's instant asked for twice gives both sides.
+        at: the motion at nondecreasing times inside the horizon; an event's instant asked for
+            twice gives both sides.
         expect: told at which instants it will be asked for, so that it may find them together.
         agreement: metric -> how far the two sources of tier C are apart; empty for the others.
         trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
         parted: when the two sources part, s; infinite if they never do.
         allowed: largest disagreement of the two sources, relative; NaN where there is one source alone.
         growth: rate at which the two part, 1/s; NaN unless they do.
-        grows: how many times more than in free flight an error of the start grows; 1 where it was not measured.
+        grows: how many times more than in free flight an error of the start grows; 1 where it was
+            not measured.
         tight: tolerance of the compiled run; NaN of another source.
         part: of the horizon that was asked for, up to which the motion is followed.
         short: why no further; empty if to the horizon.
-        horizon: up to when a scene's motion can be known, and why no further, as measured; None if to the end.
-        joined: whether contacts of a row between which no gap opens are one: those of a scene, whose rows may depend on
-            each other and rest unloaded.
+        horizon: up to when a scene's motion can be known, and why no further, as measured; None
+            if to the end.
+        joined: whether contacts of a row between which no gap opens are one: those of a scene,
+            whose rows may depend on each other and rest unloaded.
     """
 
     tier: Tier

@@ -16,8 +16,8 @@ from crossbody.reports.measuring.truth import Truth
 UNITS = {"constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m"}
 NEEDS: dict[str, str] = {}
 ROUNDING = 1e-6
-"""Part of the largest coordinate: gaps that never open beyond it are known to its tolerance alone, and on those below
-it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
+"""Part of the largest coordinate: gaps that never open beyond it are known to its tolerance alone,
+and on those below it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
 SHALLOW = 1e-12
 """Penetration below this part of the largest gap is rounding: collisions that take no time do not penetrate."""
 
@@ -100,9 +100,9 @@ def mode_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
 def _opened(truth: Trajectory, a: Contact, b: Contact) -> float:
     """How far the gap of the truth opens from one freedom to the other, over its fastest rate, s.
 
-    A row that is let go where its multiplier vanishes rises as the cube of the time: its instant is known to the cube
-    root of its depth alone, and nothing in the motion depends on it. Where a discrete variable changes in between, the
-    row's gap is another one: that instant is judged as a change of the variable.
+    A row that is let go where its multiplier vanishes rises as the cube of the time: its instant is known
+    to the cube root of its depth alone, and nothing in the motion depends on it. Where a discrete variable
+    changes in between, the row's gap is another one: that instant is judged as a change of the variable.
     """
     first, last = sorted((a.free, b.free))
     if any(first <= switch.t <= last and not switch.smooth for switch in truth.switches):

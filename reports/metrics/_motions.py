@@ -22,8 +22,8 @@ NEEDS: dict[str, str] = {}
 APART = 1e-3  # part of the largest coordinate by which a run has left the truth
 STILL = 1e-6  # a coordinate whose way is below this part of the longest of its like rests
 TURN = 0.5
-"""Angle between samples, rad, beyond which they tell no turn: the rule is off by TURN^2/12 of an axis that goes round,
-and by whole turns soon."""
+"""Angle between samples, rad, beyond which they tell no turn: the rule is off by TURN^2/12 of an
+axis that goes round, and by whole turns soon."""
 
 
 def angle_error(truth: Truth, run: Trajectory, case: Case) -> float | None:

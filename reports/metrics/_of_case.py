@@ -28,7 +28,8 @@ class OfCase:
 
     Args:
         own: the metric.
-        jumps: whether its signal jumps where lam does: releases, and changes from stick to slip, are matched too.
+        jumps: whether its signal jumps where lam does: releases, and changes from stick to slip,
+            are matched too.
     """
 
     def __init__(self, own: CaseMetric, jumps: bool = False) -> None:

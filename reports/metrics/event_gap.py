@@ -25,12 +25,12 @@ SAME = 1e-12  # part of the horizon within which two instants are one
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max |gap| of unilateral rows at touches and at the end of BALLISTIC, over the row's longest way between samples.
 
-    Where a row lets go its multiplier over its own longest way counts as well, and of both the smaller: laws without
-    memory let go at the surface whatever pushes there. So does, of a contact that sticks, how far its friction is below
-    its bound: where it reaches that, and would jam, its multiplier jumps to zero. Left out are those at whose instant
-    something else happens, by which a multiplier may jump through zero, and a start in contact. Only what is beyond the
-    errors of a row at its surface counts. None without rows that open, and where gaps depend on discrete variables; NaN
-    where an event has no instant.
+    Where a row lets go its multiplier over its own longest way counts as well, and of both the smaller:
+    laws without memory let go at the surface whatever pushes there. So does, of a contact that sticks, how
+    far its friction is below its bound: where it reaches that, and would jam, its multiplier jumps to zero.
+    Left out are those at whose instant something else happens, by which a multiplier may jump through zero,
+    and a start in contact. Only what is beyond the errors of a row at its surface counts. None without rows
+    that open, and where gaps depend on discrete variables; NaN where an event has no instant.
     """
     system = equations(case)
     if not case.law.unilateral.any() or len(run.t) < 2 or (system is not None and system.jumps):

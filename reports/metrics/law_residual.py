@@ -4,9 +4,9 @@ The residual of the law (docs/explanation, contact law), recomputed by us from q
 
     (H M^-1 H^T) lam = -(H M^-1 f + H'v + a1 h' + a0 h + a2 h^3)
 
-on the rows that the run has closed, with b0 and b1 where they are in COLLISION; of rows that depend on each other the
-part that exerts a force. Friction that slides is -mu lam_n s, s along the slip. It tells an engine that follows another
-law from one that follows this one.
+on the rows that the run has closed, with b0 and b1 where they are in COLLISION; of rows that
+depend on each other the part that exerts a force. Friction that slides is -mu lam_n s, s along
+the slip. It tells an engine that follows another law from one that follows this one.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ UNIT = "1"
 CLAIMED = False
 NEEDS = "lam"
 DEPENDENT = 1e-10
-"""Eigenvalue of H M^-1 H^T, rows scaled to 1 there, over the largest: below it rows depend on each other, as in the
-reference. What such rows carry together is unique, how they share it is not."""
+"""Eigenvalue of H M^-1 H^T, rows scaled to 1 there, over the largest: below it rows depend on each
+other, as in the reference. What such rows carry together is unique, how they share it is not."""
 
 
 def multipliers(
@@ -85,8 +85,8 @@ def multipliers(
 def _sizes(system: System, own: Floats, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.bool_]]:
     """Return what rows are measured by, and which are fulfilled first: all but those of friction that holds.
 
-    Those of contacts of a body that rocks contradict each other, and are met by least squares in what the others leave,
-    each by the size of its contact.
+    Those of contacts of a body that rocks contradict each other, and are met by least squares in
+    what the others leave, each by the size of its contact.
     """
     size, leader = np.sqrt(own), np.asarray(system.follows)[rows]
     first = np.array([i < 0 or not system.tangents[i] for i in leader], dtype=bool)
@@ -111,9 +111,9 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
     Where all carry next to nothing it is over what `idle` rows are measured by.
 
-    Where contacts slide the law of the other rows is asked for with the friction that the run has, and friction for
-    what it is by the slip. None where nothing closes, and where a controller or discrete variables act that a row of
-    the run does not show.
+    Where contacts slide the law of the other rows is asked for with the friction that the run
+    has, and friction for what it is by the slip. None where nothing closes, and where a
+    controller or discrete variables act that a row of the run does not show.
     """
     system = equations(case)
     if system is None or (system.control is not None and run.inputs is None) or system.jumps:

@@ -16,8 +16,8 @@ CLAIMED = False
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Number of samples in a mode that no event left, and of events that do not follow on the one before.
 
-    At the instant of an event a sample may stand before or behind it. Rows that open begin FREE; those that follow
-    another have no events and are left out. None without rows and where modes are not known.
+    At the instant of an event a sample may stand before or behind it. Rows that open begin FREE; those
+    that follow another have no events and are left out. None without rows and where modes are not known.
     """
     if not run.mode.size or (run.mode < 0).any():
         return None

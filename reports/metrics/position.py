@@ -45,11 +45,12 @@ def _errors(truth: Truth, run: Trajectory, case: Case) -> tuple[Floats, Floats]:
 def scale_of(exact: Trajectory, case: Case) -> Floats:
     """Return the largest |q_truth| (n,) of each coordinate; of its like, for one that rests but for rounding.
 
-    The joints of a scene, a robot's, are measured by the largest of their unit: one that hardly moves in the truth, by
-    the balance of others, tells of an engine that moves it how far that is, and not how still it ought to be. But not
-    by where bodies float, nor by more than a radian, what other rotations are measured by: a robot far from the origin,
-    or the turns of a wheel, would hide what a finger does. Where all of these rest, what the case says of their size.
-    Errors below 1e-12, what absolute tolerances are, pass the usual limit of 1e-6.
+    The joints of a scene, a robot's, are measured by the largest of their unit: one that hardly
+    moves in the truth, by the balance of others, tells of an engine that moves it how far that
+    is, and not how still it ought to be. But not by where bodies float, nor by more than a
+    radian, what other rotations are measured by: a robot far from the origin, or the turns of a
+    wheel, would hide what a finger does. Where all of these rest, what the case says of their
+    size. Errors below 1e-12, what absolute tolerances are, pass the usual limit of 1e-6.
     """
     own: Floats = np.max(np.abs(exact.q), axis=0)
     smallest = least(case.coordinates)

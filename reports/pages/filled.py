@@ -16,9 +16,9 @@ PIECES = 400  # into so many pieces a horizon is cut; shorter steps stay as they
 def filled(run: Trajectory, quaternions: Sequence[int] = (), pieces: int = PIECES) -> tuple[Floats, Floats]:
     """Instants and coordinates: all samples, and in long steps the cubic through q and v at both ends (Hermite).
 
-    With x = (t - a)/h in [0, 1]: q = (1 - x)^2 (1 + 2x) q_a + x^2 (3 - 2x) q_b + h x (1 - x)^2 v_a - h x^2 (1 - x) v_b.
-    It is exact for free flight; velocities must be the rates of the coordinates, but for the quaternions, whose rates
-    follow from the angular velocities.
+    With x = (t - a)/h in [0, 1]: q = (1 - x)^2 (1 + 2x) q_a + x^2 (3 - 2x) q_b + h x (1 - x)^2
+    v_a - h x^2 (1 - x) v_b. It is exact for free flight; velocities must be the rates of the
+    coordinates, but for the quaternions, whose rates follow from the angular velocities.
 
     Args:
         run: a motion; an instant that stands twice is never crossed.

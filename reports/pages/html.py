@@ -169,8 +169,8 @@ def plot(figure: Figure | Written) -> dict[str, Any]:
 def file_name(label: str) -> str:
     """A label as the name of a file and an id: distinct for distinct labels, no path in it.
 
-    A colon becomes a dot; whatever else is not a letter, digit, hyphen or underscore, or is too long, is replaced and
-    told apart by a hash.
+    A colon becomes a dot; whatever else is not a letter, digit, hyphen or underscore, or is too
+    long, is replaced and told apart by a hash.
     """
     plain = label.replace(":", ".", 1)
     if re.fullmatch(r"[A-Za-z0-9_-]{1,80}(\.[A-Za-z0-9_-]{1,80})?", plain) and "." not in label:

@@ -1,8 +1,9 @@
 """What a page carries folded: texts as base64 of gzip, and values whose arrays of numbers are packed as bytes.
 
-A packed value is the length of a JSON text (4 bytes), that text, and the bytes of all arrays that were taken out of
-it. Of an array consecutive rows are subtracted as whole numbers (their bit patterns), and the first bytes of all
-differences come first, then the second ones: what changes slowly becomes long runs of equal bytes. Nothing is lost.
+A packed value is the length of a JSON text (4 bytes), that text, and the bytes of all arrays that
+were taken out of it. Of an array consecutive rows are subtracted as whole numbers (their bit
+patterns), and the first bytes of all differences come first, then the second ones: what changes
+slowly becomes long runs of equal bytes. Nothing is lost.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ FINE = 2e-5  # distance of samples over the horizon below which times are writte
 EVENTS, SHARE = 40, 0.4
 """Events around which all samples stay, the first of them where there are very many, and their share of a line."""
 TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46
-"""Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one group, between groups
-(with times), pixels."""
+"""Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one
+group, between groups (with times), pixels."""
 
 
 class Sheet:

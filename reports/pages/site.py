@@ -43,8 +43,8 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
     """Make the pages of a folder that holds results.
 
     Args:
-        out: written by a run, a bench or another study; or the folder of a study that is being written, which then
-            has the pages of all studies of its output folder.
+        out: written by a run, a bench or another study; or the folder of a study that is being
+            written, which then has the pages of all studies of its output folder.
         single_file: whether one file holds all pages, style and scripts.
         against: folder of an earlier run; the index then says what has changed since.
         others: folders of studies (a bench, a gap map, ...) whose tables are taken into this one.
@@ -119,8 +119,8 @@ def _unreadable(found: Results, error: BaseException) -> str:
 def write_page(out: Path, name: str, title: str, sections: Sequence[Section], lead: str = "") -> Path:
     """Make one page of given sections in a folder of ours; links lead to the index beside it.
 
-    For a study whose page is to be made again by `crossbody report`, add a module to crossbody.reports.sections
-    instead: `write` finds it.
+    For a study whose page is to be made again by `crossbody report`, add a module to
+    crossbody.reports.sections instead: `write` finds it.
 
     Raises:
         OutputError: if the folder is not ours, or cannot be written.

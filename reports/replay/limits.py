@@ -66,8 +66,8 @@ def label(row: Row) -> str:
 def judged(row: Row, limits: Sequence[Limit]) -> tuple[Word, str, float, float]:
     """Word, reason, what it would be at best, and how far it may be from that, of one number.
 
-    A limit on one channel (`rmse_th1`) speaks before one on all of them (`rmse`). Of a share a limit names the least
-    that is within, of any other metric the largest size.
+    A limit on one channel (`rmse_th1`) speaks before one on all of them (`rmse`). Of a share a
+    limit names the least that is within, of any other metric the largest size.
     """
     if row.metric == "windows_failed" and row.value > 0.0:
         return Word.OUTSIDE, FAILED, 0.0, 0.0

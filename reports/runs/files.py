@@ -78,8 +78,8 @@ def decoded(text: bytes) -> Any:
     """JSON that a stranger may have written.
 
     Raises:
-        ValueError: for what is no JSON, is nested too deeply, or holds half of a surrogate pair, which no file can be
-            written with.
+        ValueError: for what is no JSON, is nested too deeply, or holds half of a surrogate pair,
+            which no file can be written with.
     """
     try:
         found = json.loads(text)

@@ -34,18 +34,18 @@ FINEST_TOLERANCE = 1e-12
 LOOSER = 10.0
 """A tolerance of a study over the tightest: how far their runs are apart tells what the tightest is known to."""
 MANY_STEPS, HALVINGS, LEAST_SIZES = 10_000, 5, 3
-"""A step is halved twice for its study, and up to five times while that takes no more steps; a run that has more by
-itself is studied at twice and four times its step. An order needs three of them."""
+"""A step is halved twice for its study, and up to five times while that takes no more steps; a run
+that has more by itself is studied at twice and four times its step. An order needs three of them."""
 TRUTHS = 3.0  # a truth may take so many times as long as a run: it is two of them, at tight tolerances
 ENOUGH = 2000  # steps of a run that is drawn as it is
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
 OF_STUDIES, DEARER = 2.0, 3.0
-"""Time that all runs of a study of a scene may take, in budgets, by what its own run took; one at a tight tolerance is
-taken to cost so many times as much."""
+"""Time that all runs of a study of a scene may take, in budgets, by what its own run took; one at
+a tight tolerance is taken to cost so many times as much."""
 FIRST, DEAR = 0.02, 12.0
-"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
-unless its profile is asked for: engines that follow the law take their steps in Python."""
+"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it
+is not begun unless its profile is asked for: engines that follow the law take their steps in Python."""
 COMPILED = ("reference", "compiled")  # who follows what the truth has followed
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
@@ -78,13 +78,14 @@ def run_case(
         wanted: on which engines.
         rtol: tolerance for the engines that have one.
         tell: is told what is being done.
-        settings: of the engines, by name; each takes those that it knows, and of those behind its own name and a dot
-            ("mujoco.dt", "mujoco:matched.dt") all.
+        settings: of the engines, by name; each takes those that it knows, and of those behind its
+            own name and a dot ("mujoco.dt", "mujoco:matched.dt") all.
         truth: of the case, where it is known already.
-        limit: time after which an engine that has not come back is ended with its process, s; from the command line.
+        limit: time after which an engine that has not come back is ended with its process, s;
+            from the command line.
         refine: whether the parts of errors are told even where no limit judges one.
-        budget: time, s, that the tightest run of a scene may take: its motion is compared as far as it gets, and what
-            else tells more is done where it takes some budgets at most.
+        budget: time, s, that the tightest run of a scene may take: its motion is compared as far
+            as it gets, and what else tells more is done where it takes some budgets at most.
 
     Raises:
         UnknownName: for a setting that none of them knows.

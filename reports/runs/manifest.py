@@ -1,7 +1,7 @@
 """Which files of a folder are whose: every study lists its own, and nothing else is ever replaced or removed.
 
-A folder may come from a stranger: a name that only crossbody gives is enough to make a file ours, any other name needs
-the content that was written.
+A folder may come from a stranger: a name that only crossbody gives is enough to make a file ours,
+any other name needs the content that was written.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The output folder: studies side by side, each whole or not there; what crossbody did not write is never touched.
 
-A study is written into a hidden folder inside the output folder. When all is there, one renaming makes it the one that
-counts: its files are then moved to their places, and whoever comes next finishes that if the process is killed on the
-way. Every instant has the old study or the new one, whole.
+A study is written into a hidden folder inside the output folder. When all is there, one renaming makes
+it the one that counts: its files are then moved to their places, and whoever comes next finishes that
+if the process is killed on the way. Every instant has the old study or the new one, whole.
 """
 
 from __future__ import annotations
@@ -71,8 +71,8 @@ def check(path: Path, study: str = "study") -> None:
     """Say before anything is computed whether a study can be written into a folder.
 
     Raises:
-        OutputError: if it is a file, holds something that is not ours, has the verdicts of another study, or its parent
-            cannot be written.
+        OutputError: if it is a file, holds something that is not ours, has the verdicts of
+            another study, or its parent cannot be written.
     """
     if path.is_symlink() or (path.exists() and not path.is_dir()):
         raise OutputError(f"Output {path} is not a folder; name a new folder or one that crossbody wrote.")

@@ -1,6 +1,7 @@
 """What is complete of a command that is still running: each part is on disk as soon as it is there.
 
-The same command goes on with them if it was interrupted or killed; when it comes to its end they are taken away.
+The same command goes on with them if it was interrupted or killed; when it comes to its end they
+are taken away.
 """
 
 from __future__ import annotations

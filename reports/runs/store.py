@@ -30,8 +30,8 @@ class Trace:
     Attributes:
         about: case, variant, engine, profile, settings, names and units; plain values.
         run: the motion.
-        truth: the truth's q, v, gap and lam beside every sample, impacts matched; NaN where nothing is compared, None
-            for the truth itself.
+        truth: the truth's q, v, gap and lam beside every sample, impacts matched; NaN where
+            nothing is compared, None for the truth itself.
     """
 
     about: Mapping[str, Any]
@@ -184,8 +184,8 @@ def load(path: Path) -> Trace:
 
 
 MOTION, PEAK = 4 << 30, 3
-"""Bytes that reading a motion may take in memory, a robot's on a thousand rows at 4e4 instants; and how many times its
-numbers Arrow has there at once."""
+"""Bytes that reading a motion may take in memory, a robot's on a thousand rows at 4e4 instants;
+and how many times its numbers Arrow has there at once."""
 
 
 def _table(path: Path) -> pa.Table:

@@ -108,7 +108,8 @@ def write_table(stem: Path, rows: pd.DataFrame, provenance: Mapping[str, Any]) -
 def write_rows(stem: Path, rows: Sequence[Row], kinds: Mapping[str, type], provenance: Mapping[str, Any]) -> None:
     """The same of plain rows whose columns are known.
 
-    Parquet is made of what the CSV says: `pa.array` imports pandas (.3 s) to see whether it is given one of its own.
+    Parquet is made of what the CSV says: `pa.array` imports pandas (.3 s) to see whether it is
+    given one of its own.
     """
     path = stem.with_suffix(".csv")
     told = [["" if value != value else value for value in (row[name] for name in kinds)] for row in rows]

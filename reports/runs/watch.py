@@ -1,9 +1,10 @@
 """A command in a process of its own: Ctrl-C stops it within a second, and what hangs or crashes in there is told.
 
-Compiled code does not come back to the interpreter until it is done, and a kernel may never be: no signal handler and
-no thread of the same process reaches it. The command therefore runs in a child, and its parent does nothing but watch:
-it forwards an interrupt and ends the child if that does not help, and it ends the child when a run takes longer than it
-may. The command is then begun again without that run; what was complete is on disk and is not done twice.
+Compiled code does not come back to the interpreter until it is done, and a kernel may never be:
+no signal handler and no thread of the same process reaches it. The command therefore runs in a
+child, and its parent does nothing but watch: it forwards an interrupt and ends the child if that
+does not help, and it ends the child when a run takes longer than it may. The command is then
+begun again without that run; what was complete is on disk and is not done twice.
 """
 
 from __future__ import annotations
@@ -101,8 +102,8 @@ def watched(command: Callable[[], int]) -> int:
     """Run a command in a child and watch it; its exit code.
 
     Returns:
-        What the command returns; 130 if it was interrupted, 143 if it was told to end, 3 if it crashed outside the
-        runs that it had named, at least 1 if one of these had to be ended.
+        What the command returns; 130 if it was interrupted, 143 if it was told to end, 3 if it
+        crashed outside the runs that it had named, at least 1 if one of these had to be ended.
     """
     global _diary
     _diary = _Diary()
@@ -158,7 +159,8 @@ def _say_stopped(number: int, told: dict[str, object]) -> int:
 def beside(tasks: Sequence[Callable[[], int]], jobs: int, told: Callable[[int], None]) -> int:
     """Run tasks in processes beside this one, each watched like a command; the largest of their exit codes.
 
-    A task that fails says nothing: whoever wants its result finds it missing, and does it here, where faults are told.
+    A task that fails says nothing: whoever wants its result finds it missing, and does it here,
+    where faults are told.
 
     Args:
         tasks: each leaves its result on disk.

@@ -4,11 +4,12 @@ A module has a docstring whose first line says what is drawn, and the public nam
 
     stage(p)                        a `Stage`: shapes that stand still and shapes of bodies, from the parameters
     poses(q, p)                     planar: x, y, angle of bodies (n, bodies, 3); spatial: points (n, points, 3), or
-                                    where the stage has frames origin and first two axes of each (n, frames, 9)
+                                    where the stage has frames origin and first two axes of each
+                                    (n, frames, 9)
     arrows(q, lam, p)               point and force of every arrow (n, arrows, 2 * dimensions), m and N
 
-p holds the case's parameters, and for a case that is a scene the scene as plain values (`scene`). A module knows
-neither numba nor an engine: a picture is made from stored coordinates alone.
+p holds the case's parameters, and for a case that is a scene the scene as plain values (`scene`).
+A module knows neither numba nor an engine: a picture is made from stored coordinates alone.
 """
 
 from __future__ import annotations
@@ -36,8 +37,9 @@ class Stage:
         threads: (x, y, body): a line from a fixed point to a body's origin (planar).
         lines: indices of points joined by one line (spatial); dimensions are 3 where there are any.
         down: whether the third axis points down (spatial).
-        solids: of bodies (-1: the world) in space, in their frames: `points` that a sphere of `radius` is swept over,
-            with the `faces` that have edges (indices of points); or a `plane`: origin and two axes.
+        solids: of bodies (-1: the world) in space, in their frames: `points` that a sphere of
+            `radius` is swept over, with the `faces` that have edges (indices of points); or a
+            `plane`: origin and two axes.
         bones: pairs of bodies whose origins are joined by a line.
         frames: number of bodies that solids and bones speak of.
     """

@@ -1,15 +1,16 @@
 """Studies beside the verdicts of cases: what turns the tables of a folder into sections of a page.
 
-Ours are in `_own`; those of logs, and any of a user's own, are a module each, with a docstring whose first line says
-what it shows, and the public names
+Ours are in `_own`; those of logs, and any of a user's own, are a module each, with a docstring
+whose first line says what it shows, and the public names
 
     TITLE                           heading of its page and of the link to it
     sections(out)                   tuple of `Section`; empty where the folder has no such data
 
 and, if it is about some cases, CASES, their names: its figures then stand on their pages too.
 
-It reads tables only (`crossbody.reports.runs.study.read_json`), never an engine: a page can be made again years
-later. What it must know besides stands in the `provenance` of its tables, since a folder may hold several studies.
+It reads tables only (`crossbody.reports.runs.study.read_json`), never an engine: a page can be
+made again years later. What it must know besides stands in the `provenance` of its tables, since
+a folder may hold several studies.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def names(out: Path | None = None) -> tuple[str, ...]:
     """Names of all studies.
 
     Args:
-        out: leave out those of ours that have no table in this folder: its name begins with that of its study.
+        out: leave out those of ours that have no table in this folder: its name begins with that
+            of its study.
     """
     known = {*STUDIES, *_REGISTRY.names()}
     absent = [name for name in (*STUDIES, *_REGISTRY.own()) if out is not None and not any(out.glob(f"{name}*.json"))]

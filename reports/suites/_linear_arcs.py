@@ -1,8 +1,9 @@
 """The level machine on M q'' = g - K q with constant rows, without an integrator.
 
-Between two events the motion is linear, x' = F x with x = (q, v, 1): exp(F t) is exact. Every condition of the machine
-is linear in x as well. Events are looked for at many places, densely where two conditions come near to hold at once,
-and closed in by bisection: nothing of it is shared with how the integrators find theirs.
+Between two events the motion is linear, x' = F x with x = (q, v, 1): exp(F t) is exact. Every
+condition of the machine is linear in x as well. Events are looked for at many places, densely
+where two conditions come near to hold at once, and closed in by bisection: nothing of it is
+shared with how the integrators find theirs.
 """
 
 from __future__ import annotations

@@ -62,8 +62,8 @@ def about_threshold(drawn: Drawn, _rng: np.random.Generator) -> Drawn:
 def passing(drawn: Drawn, _rng: np.random.Generator) -> Drawn:
     """The gap at rest for which the swing ends `off` metres before (positive) or behind the touch.
 
-    Centres at rest stand D apart; the ball at the end of its swing stands (L sin A, L (1 - cos A)) from its own rest,
-    and touches where (D - L sin A)^2 + L^2 (1 - cos A)^2 = 4 r^2.
+    Centres at rest stand D apart; the ball at the end of its swing stands (L sin A, L (1 - cos
+    A)) from its own rest, and touches where (D - L sin A)^2 + L^2 (1 - cos A)^2 = 4 r^2.
     """
     swing, off = numbers(drawn, "swing", "off")
     across, up = LENGTH * math.sin(swing), LENGTH * (1.0 - math.cos(swing))

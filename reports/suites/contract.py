@@ -56,12 +56,15 @@ class Family:
         fixed: the same in every run.
         scene: from what was drawn and fixed to the case's parameters; the same names if not given.
         ladder: of tolerances and steps, a further axis of the grid.
-        second: every how many runs the independent integrator is asked whatever it costs (tier C), and of the others
-            wherever the run took few steps; 0 for never: it is not needed where the case has a closed form.
-        limit: largest error of the reference against a truth of tier A to C at its default tolerance; on a rung of a
-            ladder it grows with the tolerance. Its energy account may leave ten times as much open.
+        second: every how many runs the independent integrator is asked whatever it costs (tier
+            C), and of the others wherever the run took few steps; 0 for never: it is not needed
+            where the case has a closed form.
+        limit: largest error of the reference against a truth of tier A to C at its default
+            tolerance; on a rung of a ladder it grows with the tolerance. Its energy account may
+            leave ten times as much open.
         finishes: whether the reference has to reach the horizon in each of them.
-        ends: the end state alone is asked for: the reference runs them in threads, without a record and energy account.
+        ends: the end state alone is asked for: the reference runs them in threads, without a
+            record and energy account.
         max_steps: bound on the steps of a run.
         time_limit: bound on its wall time, s.
         share: how many of the suite's runs for one of a family with share 1: cheap scenes more.
@@ -86,8 +89,8 @@ class Family:
         """Check that every name has one source.
 
         Raises:
-            InvalidValue: for a name that is drawn, fixed or in the grid twice; for neither axes nor grid; for a share
-                below 1.
+            InvalidValue: for a name that is drawn, fixed or in the grid twice; for neither axes
+                nor grid; for a share below 1.
         """
         if self.share < 1:
             raise InvalidValue(f"{self.case}:{self.variant}: share is {self.share}; valid: 1 and more.")
@@ -118,8 +121,10 @@ class Suite:
     Attributes:
         families: they share the runs, each by its own `share`.
         engines: what runs it unless the user says otherwise; the first makes every run, the others a share.
-        runs: of the first engine if nothing is said; also its share in a number for several suites: cheap scenes more.
-        about: what it stresses, in one line; of a suite in a file of its own that is the first of its docstring.
+        runs: of the first engine if nothing is said; also its share in a number for several
+            suites: cheap scenes more.
+        about: what it stresses, in one line; of a suite in a file of its own that is the first of
+            its docstring.
     """
 
     families: tuple[Family, ...]

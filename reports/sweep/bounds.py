@@ -24,8 +24,8 @@ class Overdue(BaseException):
 def bounded(seconds: float) -> Iterator[None]:
     """Raise Overdue in this thread when the time is up, between two instructions of the interpreter.
 
-    Works in any thread of a process, as a signal would not. What never comes back to the interpreter is not stopped by
-    this; `killed` ends the process then.
+    Works in any thread of a process, as a signal would not. What never comes back to the
+    interpreter is not stopped by this; `killed` ends the process then.
     """
     bell = _Bell(seconds)
     try:
@@ -59,9 +59,9 @@ class _Bell:
     def stop(self) -> None:
         """Let no ring come after this; one that may be on its way is waited for.
 
-        Taking it back (`PyThreadState_SetAsyncExc` with NULL) would leave the interpreter's mark that one is due, which
-        only an exception that arrives clears: with it a profiler or a debugger stays at a function's first instruction
-        for ever.
+        Taking it back (`PyThreadState_SetAsyncExc` with NULL) would leave the interpreter's mark
+        that one is due, which only an exception that arrives clears: with it a profiler or a
+        debugger stays at a function's first instruction for ever.
         """
         with self.lock:
             self.done = True

@@ -1,7 +1,8 @@
 """From suites to runs: quasi-random draws that depend on the seed and their own number alone.
 
-A run's numbers are those of point i of a scrambled Halton sequence (Owen, A randomized Halton algorithm in R, 2017),
-so a longer sweep begins with the shorter one, and neither workers nor engines change what is drawn.
+A run's numbers are those of point i of a scrambled Halton sequence (Owen, A randomized Halton
+algorithm in R, 2017), so a longer sweep begins with the shorter one, and neither workers nor
+engines change what is drawn.
 """
 
 from __future__ import annotations

@@ -25,8 +25,8 @@ RTOL = 1e-9  # of the reference, if nothing is said
 ACCOUNT = 10.0
 """The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
 AFFORD = 1_000
-"""The independent integrator is asked for every run of at most so many steps, and gets as much time as a run may take:
-it takes some ten times the steps. Where that is not enough the energy account alone judges."""
+"""The independent integrator is asked for every run of at most so many steps, and gets as much time as a
+run may take: it takes some ten times the steps. Where that is not enough the energy account alone judges."""
 REFUSED, SKIPPED, EXCEPTION, CRASHED = "refused", "skipped", "exception", "crashed"
 """Ends of a run that never began, or that should not be: the words beside those of `Outcome`."""
 
@@ -57,7 +57,8 @@ def execute(spec: Spec, alone: bool = False) -> dict[str, Any]:
 
     Args:
         spec: what is run.
-        alone: whether this process does nothing else: its output is then watched, and it may be ended if it hangs.
+        alone: whether this process does nothing else: its output is then watched, and it may be
+            ended if it hangs.
     """
     heard: list[str] = []
     with ExitStack() as stack:

@@ -52,7 +52,8 @@ def stability_map(rows: pd.DataFrame) -> pd.DataFrame:
     """Which engine at which tolerance or step on which stiffness.
 
     Returns:
-        One row a cell, columns `MAP`; errors are the worst over all other axes, infinite where a contact misses.
+        One row a cell, columns `MAP`; errors are the worst over all other axes, infinite where a
+        contact misses.
     """
     mapped = rows[rows["suite"] == STABILITY]
     cells: dict[tuple[Any, ...], list[int]] = {}

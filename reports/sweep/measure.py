@@ -32,7 +32,8 @@ class Asked:
     Attributes:
         limit: largest error, relative.
         near: builds a scene that differs by the tolerance of the run.
-        second: bounds on steps and on time, s, of the independent integrator, asked where there is no closed form.
+        second: bounds on steps and on time, s, of the independent integrator, asked where there
+            is no closed form.
     """
 
     limit: float
@@ -66,8 +67,9 @@ def instants(t_end: float) -> Floats:
 def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     """Against the best truth at hand, up to the divergence time.
 
-    A run further from the truth than its limit is inaccurate only where the truth itself is sharper than that: up to
-    the time at which so many errors as the run has steps, each of the size of its tolerance, may add up to the limit.
+    A run further from the truth than its limit is inaccurate only where the truth itself is
+    sharper than that: up to the time at which so many errors as the run has steps, each of the
+    size of its tolerance, may add up to the limit.
     """
     if not len(run.t):
         return Error()
@@ -121,7 +123,8 @@ def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Tru
 def _divergence(truth: Truth, times: Floats, asked: Asked, most: float, t_end: float) -> float:
     """When the truth has parted by more than `most` from that of the scene beside it, s; infinite if it never does.
 
-    That may be in a coordinate, or in the time of a touch: a gap that closes slowly closes at a time hardly known.
+    That may be in a coordinate, or in the time of a touch: a gap that closes slowly closes at a
+    time hardly known.
     """
     try:
         near = _truth(asked.near(), times, asked)
@@ -156,8 +159,9 @@ def at_the_end(case: Case, q: Floats, v: Floats) -> Error:
 def _against(truth: Truth, run: Trajectory, case: Case) -> Error:
     """Positions on matched arcs and instants of contact.
 
-    Where one of them counts more contacts, they cannot be matched: positions are then compared as they stand. Rows that
-    only pass an impulse on, and touches that press by rounding, are told by some and not by others.
+    Where one of them counts more contacts, they cannot be matched: positions are then compared as
+    they stand. Rows that only pass an impulse on, and touches that press by rounding, are told by
+    some and not by others.
     """
     truth, run = replace(truth, trajectory=lasting(truth.trajectory)), lasting(run)
     more = len(contacts(run)) - len(contacts(truth.trajectory))
@@ -188,7 +192,8 @@ def lasting(run: Trajectory) -> Trajectory:
 def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
     """By the clock of the touches or by the clock on the wall, whichever is nearer.
 
-    The first is no good where a gap that closes slowly shifts it for all that moves fast, the second beside an impact.
+    The first is no good where a gap that closes slowly shifts it for all that moves fast, the
+    second beside an impact.
     """
     position = metrics.load("position").measure(truth, run, case)
     shift = metrics.load("event_times").measure(truth, run, case)

@@ -35,8 +35,8 @@ def work(chunk: Chunk, alone: bool = False) -> tuple[int, Rows]:
 def processes(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
     """In processes of joblib's, each with its engines loaded once; as they finish.
 
-    A chunk whose process ends is cut into its runs, and these are tried one by one: the one that ends a process alone
-    is a row that says so.
+    A chunk whose process ends is cut into its runs, and these are tried one by one: the one that
+    ends a process alone is a row that says so.
     """
     warm(chunks)
     left = dict(chunks)

@@ -26,8 +26,8 @@ Ready = tuple[Spec, Case, System]
 def together(specs: Iterable[Spec]) -> list[dict[str, Any]]:
     """The rows of all specs that ask for the end alone.
 
-    What stands in one ensemble shares kernels, shape, horizon and unnamed parameters. A run that is not finite, or that
-    throws while it is built, is a row like any other.
+    What stands in one ensemble shares kernels, shape, horizon and unnamed parameters. A run that
+    is not finite, or that throws while it is built, is a row like any other.
     """
     rows, groups = [], defaultdict[Any, list[Ready]](list)
     for spec in specs:

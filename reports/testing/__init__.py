@@ -2,9 +2,9 @@
 
     from crossbody.reports.testing import assert_agrees, assert_energy
 
-`plugin` adds the options `--crossbody-case`, `--crossbody-engine` and `--crossbody-update` and the fixtures
-`crossbody_case`, `crossbody_engine`, `crossbody_truth`, `crossbody_run`, `crossbody_verdicts` and `crossbody_baseline`.
-Importing it, as every run of pytest does, imports neither numpy nor an engine.
+`plugin` adds the options `--crossbody-case`, `--crossbody-engine` and `--crossbody-update` and the
+fixtures `crossbody_case`, `crossbody_engine`, `crossbody_truth`, `crossbody_run`, `crossbody_verdicts`
+and `crossbody_baseline`. Importing it, as every run of pytest does, imports neither numpy nor an engine.
 """
 
 from __future__ import annotations

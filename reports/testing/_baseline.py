@@ -44,7 +44,8 @@ class Baseline:
             atol: in each number's own unit.
 
         Raises:
-            AssertionError: naming every number that moved, appeared or went, or saying that nothing is stored.
+            AssertionError: naming every number that moved, appeared or went, or saying that
+                nothing is stored.
             InvalidValue: for a value that is no number, or a file that cannot be read.
         """
         found = {name: _number(name, value) for name, value in values.items()}

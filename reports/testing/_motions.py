@@ -74,12 +74,13 @@ def assert_agrees(
 ) -> None:
     """Assert that a motion agrees with another one.
 
-    Touches are matched first and the arcs between them compared: a touch that comes 1 ms late is an error of 1 ms, not
-    of twice the speed.
+    Touches are matched first and the arcs between them compared: a touch that comes 1 ms late is
+    an error of 1 ms, not of twice the speed.
 
     Args:
         run: what is tested; a prepared run of an engine is run.
-        truth: what it is held against, with samples as dense as the comparison needs (it is joined by splines).
+        truth: what it is held against, with samples as dense as the comparison needs (it is
+            joined by splines).
         of: which signals, out of q, v, gap, lam and energy.
         rtol: of the largest magnitude of each column of the truth.
         atol: in each signal's own unit, for columns that rest.
@@ -156,8 +157,8 @@ def _signals(run: Trajectory, truth: Truth, of: Sequence[str], rtol: float, atol
 def assert_energy(run: Trajectory | Run, *, rtol: float = 1e-6, conserved: bool = False) -> None:
     """Assert that the integrator neither made nor lost energy.
 
-    E(t) - E(0) must be the work of the inputs, less what damping took, plus the work of every multiplier: what the
-    contact law itself makes is no error of the integrator.
+    E(t) - E(0) must be the work of the inputs, less what damping took, plus the work of every
+    multiplier: what the contact law itself makes is no error of the integrator.
 
     Args:
         run: what is tested; a prepared run of an engine is run.

@@ -19,8 +19,9 @@ class Feature:
         name: of the file too.
         text: the smallest file that has it.
         scene: what it means.
-        finds: paths of ElementTree by which a file is seen to use it, between bars; behind a ! children and @attributes
-            that are not there, each with what would say the same behind an =; empty for what no path tells.
+        finds: paths of ElementTree by which a file is seen to use it, between bars; behind a !
+            children and @attributes that are not there, each with what would say the same behind
+            an =; empty for what no path tells.
         rule: what the format says, in a sentence.
         rewrite: how to write it so that every reader reads the same; empty where there is no such way.
         about: quantities by which a reader is judged.

@@ -1,8 +1,8 @@
 """The exact motion of a ball on a linear floor (a2 = 0): free flight and contact arcs joined at exact events (tier A).
 
-Free and ballistic arcs are parabolas, contact arcs are solutions of h'' + a1 h' + a0 h = 0; the machine is the
-level machine. A contact ends at the first root of lam/m = g + h'': h'' solves the same equation, so its extrema
-are known and bracket the root, or show that there is none (the ball is captured).
+Free and ballistic arcs are parabolas, contact arcs are solutions of h'' + a1 h' + a0 h = 0; the machine
+is the level machine. A contact ends at the first root of lam/m = g + h'': h'' solves the same equation,
+so its extrema are known and bracket the root, or show that there is none (the ball is captured).
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@
     Hertz         F = k d^(3/2)                      k such that the first pair alone would get as deep as with springs
     memoryless    h'' + a1 h' + a0 h >= 0, lam >= 0, lam . (...) = 0 over all h <= 0 (docs/explanation/model.md)
 
-d = max(0, -h). Units of the integration: 1/w for time, speed/w for length, w = sqrt(a0). When every gap is open and
-opening nothing acts any more: the speeds there are final, no instant has to be located.
+d = max(0, -h). Units of the integration: 1/w for time, speed/w for length, w = sqrt(a0). When every gap
+is open and opening nothing acts any more: the speeds there are final, no instant has to be located.
 """
 
 from __future__ import annotations

@@ -4,8 +4,9 @@
     simultaneous   all at once: impulses J >= 0, h'+ + e h'- >= 0, and J is 0 where that is not 0 (Newton's law of
                    impact as a linear complementarity problem; Moreau 1988)
 
-Both are exact: a collision that takes no time moves nothing. Touching balls of small restitution collide without end
-at one instant, each time slower (Bernu and Mazighi 1990): by the law's own measure (`STILL`) there is a last one.
+Both are exact: a collision that takes no time moves nothing. Touching balls of small restitution
+collide without end at one instant, each time slower (Bernu and Mazighi 1990): by the law's own
+measure (`STILL`) there is a last one.
 """
 
 from __future__ import annotations
@@ -77,8 +78,8 @@ def delassus(masses: Floats) -> Floats:
 def pushes(G: Floats, b: Floats) -> Floats:
     """The solution x (k,) of 0 <= x, G x + b >= 0, x . (G x + b) = 0, G (k, k) positive definite.
 
-    If not all push, the set that does is found by non-negative least squares on the Cholesky factor, in finitely many
-    steps.
+    If not all push, the set that does is found by non-negative least squares on the Cholesky
+    factor, in finitely many steps.
     """
     x: Floats = np.asarray(np.linalg.solve(G, -b), dtype=np.float64)
     if x.min() >= 0.0:

@@ -33,7 +33,8 @@ def speeds(run: Trajectory, case: Case) -> Floats:
 def outgoing(run: Trajectory, case: Case) -> tuple[int, Floats | None]:
     """Find the sample behind the collisions, and the speeds there (balls,), m/s; None where they are not over.
 
-    Sliders: the last sample. Pendulums: the first behind the first touch at which nothing pushes and no gap closes.
+    Sliders: the last sample. Pendulums: the first behind the first touch at which nothing pushes
+    and no gap closes.
     """
     moving = speeds(run, case)
     if not len(run.t):

@@ -80,7 +80,8 @@ class Motion:
     def _collide(self, t: float, v: Floats, touching: Touching, work: Floats, course: _Course) -> bool:
         """Let the touching balls collide; whether any did. v and work are moved on in place.
 
-        A collision is told of a row that closed; one that stood still and passes an impulse on has none of its own.
+        A collision is told of a row that closed; one that stood still and passes an impulse on
+        has none of its own.
         """
         before, rates, last = len(course.events), np.diff(v).tolist(), len(touching) - 1
         course.fastest = max(course.fastest, *map(abs, rates))

@@ -1,8 +1,9 @@
 """Newton's cradle as numbers: masses, start and law of a row of balls.
 
-Two forms share them. Sliders: q_i is the displacement of ball i from its place at the start, so that touching
-neighbours have a gap of exactly 0; h_i = gap + q_(i+1) - q_i. Pendulums: q_i is the angle of string i from the
-vertical, counter-clockwise; pivots stand 2 radius + gap apart, and the gap is that between the circles.
+Two forms share them. Sliders: q_i is the displacement of ball i from its place at the start, so
+that touching neighbours have a gap of exactly 0; h_i = gap + q_(i+1) - q_i. Pendulums: q_i is the
+angle of string i from the vertical, counter-clockwise; pivots stand 2 radius + gap apart, and the
+gap is that between the circles.
 """
 
 from __future__ import annotations
@@ -101,10 +102,11 @@ def _arrival(parameters: Mapping[str, Value], mechanism: str) -> float:
 def law(balls: Row, collisions: str) -> RowLaw:
     """Return the constants of every row.
 
-    A frozen collision takes no time, so its constants are those of COLLISION, beta = (a0, 2 zeta sqrt(a0)). What is
-    captured is held with a hundredth of their frequency and no oscillation (a double pole): it starts at h = h' = 0,
-    has nothing to work off, and must not make the equations stiff again. Resolved, one set does everything: a second
-    one would change the potential of the law at the hand-over, and with it what is to be shown.
+    A frozen collision takes no time, so its constants are those of COLLISION, beta = (a0, 2 zeta
+    sqrt(a0)). What is captured is held with a hundredth of their frequency and no oscillation (a
+    double pole): it starts at h = h' = 0, has nothing to work off, and must not make the
+    equations stiff again. Resolved, one set does everything: a second one would change the
+    potential of the law at the hand-over, and with it what is to be shown.
     """
     w = math.sqrt(balls.a0)
     a0, a1 = balls.a0, 2.0 * balls.zeta * w

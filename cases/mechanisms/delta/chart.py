@@ -1,7 +1,8 @@
 """Coordinates of the delta robot in a tree of hinges, and back, with rates.
 
-A tree turns each arm by hinge x (q1), hinge x (alpha, relative to the proximal link) and hinge z (gamma), with the
-distal link along local y. With d = (s2 s3, c2, s2 c3) the direction of that link in the arm's frame,
+A tree turns each arm by hinge x (q1), hinge x (alpha, relative to the proximal link) and hinge z
+(gamma), with the distal link along local y. With d = (s2 s3, c2, s2 c3) the direction of that
+link in the arm's frame,
 
     phi = q1 + alpha = atan2(d_z, d_y)     gamma = atan2(-d_x, hypot(d_y, d_z))
     d = (-sin gamma, cos gamma cos phi, cos gamma sin phi)

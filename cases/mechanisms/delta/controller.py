@@ -1,8 +1,8 @@
 """The sampled control of the delta robot in NumPy, for runs on a scene, which must not borrow the reference's.
 
-Written apart from the compiled controller, from the equations of the robot alone, so that each checks the other: a
-term that one forgets leaves the motions apart. With y the motor angles, x the six angles that nobody measures,
-h(y, x) = 0 the closed loops, X = dx/dy = -h_x^-1 h_y, S = [I; X] and z the flange,
+Written apart from the compiled controller, from the equations of the robot alone, so that each checks
+the other: a term that one forgets leaves the motions apart. With y the motor angles, x the six angles
+that nobody measures, h(y, x) = 0 the closed loops, X = dx/dy = -h_x^-1 h_y, S = [I; X] and z the flange,
 
     Jy = dz/dy along the loops     My = S^T M S (exact) or M_yy + M_yx X     tau_g = S^T dV/dq
     u = My Jy^-1 (ki INT e + kp e + kd e' + r'') + S^T D S y' + tau_g,   e = r - z          linearising

@@ -1,7 +1,8 @@
 """The delta robot as a scene: three arms of hinges whose tips two loops join, a third of the flange at each.
 
-Gravity is along +z, which points down. Friction and servos act on the absolute angles (q1, q2, q3) of an arm, whose
-rates follow from those of the tree, with phi = q1 + alpha and d the direction of the distal link, as
+Gravity is along +z, which points down. Friction and servos act on the absolute angles (q1, q2,
+q3) of an arm, whose rates follow from those of the tree, with phi = q1 + alpha and d the
+direction of the distal link, as
 
     q2' = (sin gamma cos phi gamma' + cos gamma sin phi phi')/s2        s2 = hypot(d_x, d_z)
     q3' = (-sin phi gamma' + sin gamma cos gamma cos phi phi')/s2^2

@@ -12,8 +12,8 @@ SOFT = (
 )
 _TIGHT = "tolerances of 1e-9 and 1e-10 and steps of 1 ms leave less than this on a smooth motion"
 _TOLERANCE, _GROWTH, _ADDED = 1e-9, 2e3, 50.0
-"""Default tolerance; how much a difference of the starts grows in the fall (280 in the light robot, 1,940 in the heavy
-one, moved aside by 1e-8 m); independent errors of some 2,500 steps add up as their root."""
+"""Default tolerance; how much a difference of the starts grows in the fall (280 in the light robot, 1,940
+in the heavy one, moved aside by 1e-8 m); independent errors of some 2,500 steps add up as their root."""
 _FALLEN = _TOLERANCE * _GROWTH * _ADDED
 _LEVER = 0.1
 """Of the flange, m/rad, in order of magnitude: its links are .1 to .3 m long and share an angle's error."""

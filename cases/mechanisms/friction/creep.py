@@ -1,14 +1,15 @@
 """How fast a place that friction holds creeps down a slope in engines, from their own parameters.
 
-Drake's lagged law gives mu N s/sqrt(1 + s^2) at s times its stiction tolerance, TAMSI's mu N s (2 - s); SAP's lets a
-place slip at sigma times what its inverse mass makes of friction's impulse in a step; DART adds a part cfm to the
-diagonal of its problem. With rho = tan(slope)/mu, the tangential acceleration g_t and the step dt:
+Drake's lagged law gives mu N s/sqrt(1 + s^2) at s times its stiction tolerance, TAMSI's mu N s (2
+- s); SAP's lets a place slip at sigma times what its inverse mass makes of friction's impulse in
+a step; DART adds a part cfm to the diagonal of its problem. With rho = tan(slope)/mu, the
+tangential acceleration g_t and the step dt:
 
     lagged   v = stiction rho/sqrt(1 - rho^2)        tamsi  v = stiction (1 - sqrt(1 - rho))
     sap      v = sigma g_t dt/sqrt(3)                DART   v = cfm g_t dt
 
-MuJoCo's rows are springs and dampers b v + k d r of an impedance d, with R = (1 - d)/d of the inverse mass between the
-force and them. A force that holds needs a rate:
+MuJoCo's rows are springs and dampers b v + k d r of an impedance d, with R = (1 - d)/d of the
+inverse mass between the force and them. A force that holds needs a rate:
 
     elliptic     v = (1 - d)/d g_t / (impratio b)
     pyramidal    b mu v = 2 rho N0 for rho = tan(slope)/mu <= 1/2, else N0 (3 rho - 1)/(1 - rho),  N0 = k d r

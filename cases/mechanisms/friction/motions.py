@@ -1,7 +1,7 @@
 """Exact motions with friction: how a body slides on a slope and stops, turns or goes on (docs/explanation/contacts.md).
 
-A is the acceleration downhill, B = mu g cos(slope) that of friction. Straight slides are parabolas. An oblique one
-turns downhill: with th from downhill, u = tan(th/2) and kappa = B/A,
+A is the acceleration downhill, B = mu g cos(slope) that of friction. Straight slides are
+parabolas. An oblique one turns downhill: with th from downhill, u = tan(th/2) and kappa = B/A,
 
     |v| = C u^kappa / sin th,    u' = -A u / |v|,
 

@@ -1,7 +1,8 @@
 """Exact motion of a mass on a spring whose guide has dry friction, and how fast MuJoCo has it creep where it holds.
 
-With w^2 = k/m and reach = f/k it swings about reach on either side, each half swing shorter by twice that, and stays
-where it stops within reach of the spring's rest. Without a spring it slides on a parabola, and stays where it stops.
+With w^2 = k/m and reach = f/k it swings about reach on either side, each half swing shorter by
+twice that, and stays where it stops within reach of the spring's rest. Without a spring it slides
+on a parabola, and stays where it stops.
 """
 
 from __future__ import annotations
@@ -68,8 +69,8 @@ def oscillator(p: Mapping[str, float]) -> Motion:
 def creep(p: Mapping[str, float], soft: Soft) -> float:
     """Return how fast a mass that friction holds creeps at the horizon, m/s.
 
-    MuJoCo's row is a damper b v whose force a softness R = (1 - d)/d of the inverse mass limits, d that of no depth:
-    (1 + R) x'' + b x' + R k/m x = 0.
+    MuJoCo's row is a damper b v whose force a softness R = (1 - d)/d of the inverse mass limits,
+    d that of no depth: (1 + R) x'' + b x' + R k/m x = 0.
     """
     d = soft.impedance(0.0)
     softness, rate = (1.0 - d) / d, p["stiffness"] / p["mass"]

@@ -19,9 +19,9 @@ BASE = np.flatnonzero(CORNERS[:, 2] < 0.0)  # corners on which a box lies
 def belt(p: Mapping[str, float]) -> Motion:
     """Return the motion of a block on a belt of speed V and a spring of rate w^2 from rest.
 
-    It slides, sticks where it is as fast as the belt, and slides from where the spring pulls as much as friction gives,
-    on a sine that grazes the belt's speed once a period and does not stick there. All of it is seen from the belt:
-    q = (x, z), rows (n, t1, t2).
+    It slides, sticks where it is as fast as the belt, and slides from where the spring pulls as
+    much as friction gives, on a sine that grazes the belt's speed once a period and does not
+    stick there. All of it is seen from the belt: q = (x, z), rows (n, t1, t2).
     """
     V, w, press = p["speed"], math.sqrt(p["stiffness"] / MASS), MASS * p["gravity"]
     reach = p["mu"] * press / p["stiffness"]

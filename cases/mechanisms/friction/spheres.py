@@ -1,7 +1,8 @@
 """Exact motions of a homogeneous sphere that slides on a level floor until it rolls.
 
-Its slip u, the velocity of the lowest point, falls along itself at 7 mu g/2: the centre goes on a parabola, then
-straight (docs/explanation/contacts.md). The attitude has a closed form where the axis of turning keeps its direction.
+Its slip u, the velocity of the lowest point, falls along itself at 7 mu g/2: the centre goes on a
+parabola, then straight (docs/explanation/contacts.md). The attitude has a closed form where the
+axis of turning keeps its direction.
 """
 
 from __future__ import annotations

@@ -19,7 +19,8 @@ def claims(variant: str, p: Mapping[str, Value], maze: Maze) -> tuple[Claim, ...
 def fallen(p: Mapping[str, Value], maze: Maze) -> float:
     """Height through which the ball has moved on its face at most, over its circle's radius, from small motions.
 
-    On top of a face its angle grows as cosh, inside it swings as cos; infinite where a controller moves the maze.
+    On top of a face its angle grows as cosh, inside it swings as cos; infinite where a controller
+    moves the maze.
     """
     angle, outer = abs(float(p["angle"])), p["side"] == "outer"
     if p["controller"] != "off" or not angle:
@@ -118,8 +119,8 @@ def limits(claims: Iterable[Claim], fallen: float) -> tuple[Limit, ...]:
 
     Args:
         claims: what it claims.
-        fallen: height through which the ball moves on its face, over the radius of its circle; infinite where more
-            than gravity drives it.
+        fallen: height through which the ball moves on its face, over the radius of its circle;
+            infinite where more than gravity drives it.
     """
     bounds = {**_ALWAYS, **{claim.metric: _CLAIMED[claim.metric] for claim in claims}}
     if _TOLERATED / fallen > _DEFAULT:

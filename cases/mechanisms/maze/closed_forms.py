@@ -1,8 +1,8 @@
 """What a ball that rolls on a ring's face does, in closed form.
 
-R is the radius of the face, rho the radius of the circle of the ball's centre: R + r on an outer face, R - r inside.
-With k = J/r^2 = 2/5 m of a solid ball, Jm the maze's inertia (infinite where it is locked), and no input, rolling
-eliminates spin and maze, and the angle from the vertical obeys
+R is the radius of the face, rho the radius of the circle of the ball's centre: R + r on an outer
+face, R - r inside. With k = J/r^2 = 2/5 m of a solid ball, Jm the maze's inertia (infinite where it
+is locked), and no input, rolling eliminates spin and maze, and the angle from the vertical obeys
 
     mu rho delta'' = +- g sin(delta),     mu = 1 + (k/m) (1 - k R^2/(Jm + k R^2))      (1 without friction)
 """

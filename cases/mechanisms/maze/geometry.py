@@ -1,8 +1,9 @@
 """Rings, gaps and tips of the ball maze.
 
-Angles count counter-clockwise from +x in the maze's own frame; gravity points along -y. A gap is a sector between two
-tips: the ends of a ring's wall are caps of radius w/2, w = outer - inner, centred on the circle of radius
-(inner + outer)/2 at the gap's centre -+ he. A face ends where a cap begins, at he, so gap and normal are continuous.
+Angles count counter-clockwise from +x in the maze's own frame; gravity points along -y. A gap is
+a sector between two tips: the ends of a ring's wall are caps of radius w/2, w = outer - inner,
+centred on the circle of radius (inner + outer)/2 at the gap's centre -+ he. A face ends where a
+cap begins, at he, so gap and normal are continuous.
 """
 
 from __future__ import annotations
@@ -111,7 +112,8 @@ def maze_of(p: Mapping[str, Value]) -> Maze:
     """The maze of a scene, checked.
 
     Raises:
-        InvalidValue: for rings that overlap, gaps that cover a ring, or a ball that fits into no channel or gap.
+        InvalidValue: for rings that overlap, gaps that cover a ring, or a ball that fits into no
+            channel or gap.
     """
     count = int(p["rings"])
     rings = [_ring(p, i) for i in range(min(count, TABLE))]

@@ -19,8 +19,9 @@ from crossbody.cases.mechanisms.maze.geometry import Maze, tilted_gravity
 INNER, OUTER, GAPS, REACH, PHASE, COLUMNS = range(6)
 """Of every ring from the centre outwards; the closed wall stands last."""
 CHANNEL, SECTOR_BELOW, SECTOR_ABOVE, CONTROL, TARGET, TOUCHING = range(-6, 0)
-"""Discrete: rings inside the ball's distance from the axis; number of the gap beside the ball in the ring below and
-above, SOLID beside a wall; mode of the controller. Then the angle that a snatch goes to, and whether a face is touched.
+"""Discrete: rings inside the ball's distance from the axis; number of the gap beside the ball in
+the ring below and above, SOLID beside a wall; mode of the controller. Then the angle that a
+snatch goes to, and whether a face is touched.
 """
 DISCRETE, LATCHED = 4, 2
 SOLID = -1

@@ -1,11 +1,12 @@
 """The torque on the maze that balances the ball and drops it through the gaps, and rolling damping.
 
-With b = atan2(y, x), k = Jb/r^2, kk = k/mb and R the radius of the face on which the ball rolls at rho, rolling obeys
+With b = atan2(y, x), k = Jb/r^2, kk = k/mb and R the radius of the face on which the ball rolls
+at rho, rolling obeys
 
     (mb + k) rho b'' = -mb g cos b + k R theta''          Jm theta'' = u - R lam_t
 
-so a wanted b'' = w needs theta'' = ((1 + kk) rho w + g cos b)/(kk R). The law places three poles, at a constant rate
-omega of the maze (flat output rate y' = kk R theta' - (1 + kk) rho b', y'' = g cos b):
+so a wanted b'' = w needs theta'' = ((1 + kk) rho w + g cos b)/(kk R). The law places three poles, at a
+constant rate omega of the maze (flat output rate y' = kk R theta' - (1 + kk) rho b', y'' = g cos b):
 
     w = -k2 b' - k1 eps + s k0 (y' - kk R omega)/g        eps = b - s pi/2,  s = +1 on top of a ring, -1 at its bottom
 

@@ -1,8 +1,8 @@
 """What decides the order of modes of the red body, in closed form, and how much of the order a run shows.
 
-The slab stays still on its feet, so the box moves alone: it falls free, its left corner is caught, it turns about that
-corner until it is level, and its right corner strikes. `inequalities` tells which of the conditions for the order a set
-of parameters breaks.
+The slab stays still on its feet, so the box moves alone: it falls free, its left corner is
+caught, it turns about that corner until it is level, and its right corner strikes. `inequalities`
+tells which of the conditions for the order a set of parameters breaks.
 """
 
 from __future__ import annotations

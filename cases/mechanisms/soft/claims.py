@@ -75,9 +75,9 @@ _PEAK = 1.875  # fastest rate of the jaws' path over its mean
 def _fixed_steps(p: Mapping[str, float], moving: float) -> Iterator[tuple[str, float, str]]:
     """What a fixed step leaves of the decay of a pad behind its touch: metric, limit and reason.
 
-    The law excites the pad's fast mode by a1/fast of the speed of the touch, which is at most the largest there is.
-    The polynomial R of Runge-Kutta 4 misses the exponential of a step by a twentieth, and of all steps together, each
-    smaller by R, by 1/(1 - R)^2 times that.
+    The law excites the pad's fast mode by a1/fast of the speed of the touch, which is at most the
+    largest there is. The polynomial R of Runge-Kutta 4 misses the exponential of a step by a
+    twentieth, and of all steps together, each smaller by R, by 1/(1 - R)^2 times that.
 
     Args:
         p: parameters, SI.

@@ -1,7 +1,7 @@
 """The soft contact on its axis as a scene: flange, pads on it, block, and slides that carry controller and sensors.
 
-Written apart from the reference's kernels. The pads hang on the flange, so that their dampers are those of joints: they
-are counted from it, in the case from the world.
+Written apart from the reference's kernels. The pads hang on the flange, so that their dampers are
+those of joints: they are counted from it, in the case from the world.
 """
 
 from __future__ import annotations

@@ -51,7 +51,8 @@ def flange(run: Trajectory, case: Case) -> Floats:
 def invariant(run: Trajectory, case: Case) -> Floats:
     """Return x_ref + k (mb b' + bt (b - b0)) + k (y_R - y_L)/ks of every sample (n,), m.
 
-    Of q and v as the reference's mechanisms carry them: the error is the rate of its integral, x_ref = error + flange.
+    Of q and v as the reference's mechanisms carry them: the error is the rate of its integral,
+    x_ref = error + flange.
     """
     p = {name: case.number(name) for name in ("block_mass", "bt", "ks", "pad_mass")}
     k = 0.01 * case.number("kstar")

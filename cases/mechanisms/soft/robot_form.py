@@ -1,7 +1,7 @@
 """The soft contact on the delta robot as a scene: its arms, and beside them pads, block, and what carries states.
 
-Written apart from the reference's kernels. The flange carries the fingers; its controller has feedback linearisation
-with an integral, whose reference the touch sensors move along x and a path along z.
+Written apart from the reference's kernels. The flange carries the fingers; its controller has feedback
+linearisation with an integral, whose reference the touch sensors move along x and a path along z.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """How engines write the coordinates of joints, and the rotations that stand behind that.
 
-Velocities of the scene are v = J v_e of the engine's, with v' = J v_e' + bend: M_e = J^T M J, b_e = J^T (b + M bend).
+Velocities of the scene are v = J v_e of the engine's, with v' = J v_e' + bend: M_e = J^T M J, b_e
+= J^T (b + M bend).
 """
 
 from __future__ import annotations

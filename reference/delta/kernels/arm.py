@@ -1,8 +1,8 @@
 """One arm of the delta robot: position, Jacobian, inertia and forces.
 
-The proximal link moves its end along n = (0, -s1, c1); the distal link points along d = (s2 s3, c2, s2 c3) and
-turns about it along e2 = (c2 s3, -s2, c2 c3) and e3 = (c3, 0, -s3), which are orthonormal with d.
-A sextuple `T` holds (c1, s1, c2, s2, c3, s3); everything is a scalar, so that nothing is allocated.
+The proximal link moves its end along n = (0, -s1, c1); the distal link points along d = (s2 s3, c2, s2
+c3) and turns about it along e2 = (c2 s3, -s2, c2 c3) and e3 = (c3, 0, -s3), which are orthonormal with
+d. A sextuple `T` holds (c1, s1, c2, s2, c3, s3); everything is a scalar, so that nothing is allocated.
 """
 
 from __future__ import annotations

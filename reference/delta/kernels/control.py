@@ -1,8 +1,9 @@
 """Sampled controllers of the delta robot, called at ticks.
 
-Their numbers stand in the parameters p from `FIRST` on: a header (`HEADER`), the knots of the gains, and the reference
-at every tick. Their state s holds what a rig's computer remembers (`STATE`). A pose at which the control Jacobian is
-singular makes the torque NaN, which ends the run: holding the last torque would hide it.
+Their numbers stand in the parameters p from `FIRST` on: a header (`HEADER`), the knots of the
+gains, and the reference at every tick. Their state s holds what a rig's computer remembers
+(`STATE`). A pose at which the control Jacobian is singular makes the torque NaN, which ends the
+run: holding the last torque would hide it.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Kinematics of the closed robot in compiled code.
 
-With R_i d_i the directions of the distal links in the base frame, stacked as the rows of D, a motion z' of the flange
-and the rates y' of the motors obey D z' = diag(l1 n_i . d_i) y', since e2 and e3 are orthogonal to d. Therefore the
-6 x 6 system h_x dx = -h of Newton's method shrinks to one with D, and Jy = D^-1 diag(l1 n_i . d_i). D is singular
-exactly where h_x is.
+With R_i d_i the directions of the distal links in the base frame, stacked as the rows of D, a
+motion z' of the flange and the rates y' of the motors obey D z' = diag(l1 n_i . d_i) y', since e2
+and e3 are orthogonal to d. Therefore the 6 x 6 system h_x dx = -h of Newton's method shrinks to
+one with D, and Jy = D^-1 diag(l1 n_i . d_i). D is singular exactly where h_x is.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Linear algebra on 3 x 3 blocks held as tuples of rows: nothing is allocated.
 
-The 6 x 6 system [[A, X], [X^T, B]] is factorised by blocks, A = L D L^T, Z = L^-1 X, B - Z^T D^-1 Z = L' D' L'^T.
+The 6 x 6 system [[A, X], [X^T, B]] is factorised by blocks, A = L D L^T, Z = L^-1 X, B - Z^T D^-1
+Z = L' D' L'^T.
 """
 
 from __future__ import annotations

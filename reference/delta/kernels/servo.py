@@ -2,7 +2,8 @@
 
     u_i = kp (y_ref,i - y_i) + kd (y_ref,i' - y_i') + feed-forward
 
-The feed-forward, if asked for, is the torque that holds the symmetric pose at y_ref with the flange on the axis.
+The feed-forward, if asked for, is the torque that holds the symmetric pose at y_ref with the
+flange on the axis.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Accelerations and multipliers of the delta robot by blocks: no dense 9 x 9 or 15 x 15 system.
 
-The third rate of each arm is scaled, s2 w: the mass block becomes [[A, Bc P, Bc Q/s2], [., Cc, 0], [., 0, Cc]] and the
-Jacobian [l1 n, l2 e2, l2 e3]. Since e2, e3, d are orthonormal, its Schur complement S and W = dpsi M^-1 dpsi^T are
+The third rate of each arm is scaled, s2 w: the mass block becomes [[A, Bc P, Bc Q/s2], [., Cc,
+0], [., 0, Cc]] and the Jacobian [l1 n, l2 e2, l2 e3]. Since e2, e3, d are orthonormal, its Schur
+complement S and W = dpsi M^-1 dpsi^T are
 
     S = A - Bc^2/Cc (P^2 + (Q/s2)^2)     k = (l1 - l2 Bc/Cc) n + l2 Bc/Cc (n . d) d
     W = l2^2/Cc (I - d d^T) + k k^T/S
