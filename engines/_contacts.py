@@ -280,10 +280,10 @@ class Contacts:
         mine = [(stands[at[row][0]], at[row][1], i) for i, row in enumerate(wanted) if at[row][0] in stands]
         contact, place, rows = np.array(mine, dtype=np.intp).T
         return _Group(
-            kinds=kinds, which=which, one=np.searchsorted(shapes, one), two=np.searchsorted(shapes, two),
-            sizes=(self._sizes(one), self._sizes(two)),
-            margin=np.array([pair.pair.margin for pair in pairs]), sine=np.array([pair.parallel for pair in pairs]),
-            taken=(contact, place), rows=rows,
+            kinds=kinds, which=which, one=np.searchsorted(shapes, one),
+            two=np.searchsorted(shapes, two), sizes=(self._sizes(one), self._sizes(two)),
+            margin=np.array([pair.pair.margin for pair in pairs]),
+            sine=np.array([pair.parallel for pair in pairs]), taken=(contact, place), rows=rows,
         )  # fmt: skip
 
     def _sizes(self, shapes: Indices) -> Floats:

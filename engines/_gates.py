@@ -18,7 +18,8 @@ from crossbody.engines._log import Modes
 
 _V, _M, _B, _I = types.float64[::1], types.float64[:, ::1], types.int8[::1], types.int64
 _SIGNATURES = {
-    "rows": types.void(_V, _V, _V, _V, _M, _V), "guards": types.void(_V, _V, _V), "switch": _I(_V, _V, _B, _I),
+    "rows": types.void(_V, _V, _V, _V, _M, _V), "guards": types.void(_V, _V, _V),
+    "switch": _I(_V, _V, _B, _I),
 }  # fmt: skip
 
 ALL_AT_ONCE = "Which rows can be touched depends on where bodies are: no state has all of them on at once."

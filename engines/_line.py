@@ -174,10 +174,10 @@ def line(case: Case) -> Line:
     stored = float(np.max(np.sqrt(law.a0) * np.abs(H @ case.q0 + h0), initial=0.0))
     return Line(
         axis=axis, places=np.array([body.position for body in scene.bodies]) - np.outer(reference, axis),
-        bodies=tuple(body.name for body in scene.bodies), masses=np.array([body.mass for body in scene.bodies]),
-        gravity=gravity,
-        shapes=tuple(shape for shape in scene.shapes if shape.name in met), H=H, h0=h0, q0=case.q0, v0=case.v0,
-        a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
+        bodies=tuple(body.name for body in scene.bodies),
+        masses=np.array([body.mass for body in scene.bodies]), gravity=gravity,
+        shapes=tuple(shape for shape in scene.shapes if shape.name in met), H=H, h0=h0, q0=case.q0,
+        v0=case.v0, a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral,
         fastest=float(np.max(np.abs(case.v0))) + abs(gravity) * case.t_end + stored or 1.0,
     )  # fmt: skip
 

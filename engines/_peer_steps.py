@@ -84,8 +84,9 @@ class Steps:
             outcome, what = Outcome.STEP_LIMIT, f"{self.max_steps} steps of {self.dt:g} s were not enough"
         place = f"t = {t[-1]:g} s, q = {q[-1].tolist()}, v = {v[-1].tolist()}"
         return Trajectory(
-            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=events(t, mode), outcome=outcome,
-            message="" if outcome.ok else f"{place}: {what}.", steps=len(t) - 1, wall_s=wall_s,
+            t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=events(t, mode),
+            outcome=outcome, message="" if outcome.ok else f"{place}: {what}.",
+            steps=len(t) - 1, wall_s=wall_s,
         )  # fmt: skip
 
     def _multipliers(self, t: Floats, v: Floats) -> Floats:

@@ -176,8 +176,8 @@ def _trajectory(
     message = "" if outcome.ok else f"t = {t[-1]:g} s, q = {q[-1].tolist()}, v = {v[-1].tolist()}: {what}."
     t = np.where(t > case.t_end, case.t_end, t)
     return sampled(
-        scene, t, q, v, np.where(scene.unilateral, np.maximum(lam, 0.0), lam), wall_s=wall_s, steps=len(t) - 1,
-        outcome=outcome, message=message,
+        scene, t, q, v, np.where(scene.unilateral, np.maximum(lam, 0.0), lam), wall_s=wall_s,
+        steps=len(t) - 1, outcome=outcome, message=message,
     )  # fmt: skip
 
 
@@ -236,8 +236,9 @@ class Exudyn(Engine):
         model = _build(scene, symbolic=profile == "matched")
         extra = {"law": law_name(scene)} if profile == "matched" else {"method": "GeneralizedAlpha"}
         return PeerRun(
-            engine=self.name, profile=profile, settings=used | extra, integrate=_integrator(case, scene, model, used),
-            physics=_audit(case, scene, model), follows=followed(case, scene) if profile == "matched" else None,
+            engine=self.name, profile=profile, settings=used | extra,
+            integrate=_integrator(case, scene, model, used), physics=_audit(case, scene, model),
+            follows=followed(case, scene) if profile == "matched" else None,
         )  # fmt: skip
 
 

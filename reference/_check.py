@@ -106,8 +106,8 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
         "dynamics": {"M": np.full((s.n, s.mass_block), nan), "f": np.full(s.n, nan), "w": np.zeros(s.scratch)},
         "gaps": {"h": np.full(s.nc, nan), "hd": np.full(s.nc, nan)},
         "rows": {"H": np.zeros((s.nc, s.n)), "h": np.full(s.nc, nan), "Hdv": np.full(s.nc, nan)},
-        "energy": {"e": np.full(2, nan)}, "power": {"e": np.full(2, nan)}, "watch": {"g": np.full(s.guards, nan)},
-        "velocity": {"qd": np.full(s.nq, nan)},
+        "energy": {"e": np.full(2, nan)}, "power": {"e": np.full(2, nan)},
+        "watch": {"g": np.full(s.guards, nan)}, "velocity": {"qd": np.full(s.nq, nan)},
     }  # fmt: skip
     for name, outputs in rooms.items():
         kernel = s.kernels[name]

@@ -143,6 +143,7 @@ def read_back(codegen: Any, kept: tuple[str, str, tuple[bytes, bytes]], descript
     library._set_compiled_object(code)
     library._finalize_final_module()
     codegen._engine._defined_symbols |= {
-        description.llvm_func_name, description.llvm_cpython_wrapper_name, description.llvm_cfunc_wrapper_name,
+        description.llvm_func_name, description.llvm_cpython_wrapper_name,
+        description.llvm_cfunc_wrapper_name,
     }  # fmt: skip
     return library

@@ -35,8 +35,8 @@ from crossbody.reference._hastened import hastened
 from crossbody.reference._parts import PartPasses, WholePasses, read_back
 
 _SETTINGS = (
-    "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX", "DEBUGINFO_DEFAULT",
-    "CPU_NAME", "CPU_FEATURES", "FULL_TRACEBACKS", "LLVM_PASS_TIMINGS",
+    "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX",
+    "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "FULL_TRACEBACKS", "LLVM_PASS_TIMINGS",
 )  # fmt: skip
 
 OURS = "crossbody.reference."
@@ -259,8 +259,8 @@ def _rebuilt(
     for one in environments:
         library.codegen.set_env(one.env_name, one)
     return CompileResult(
-        context.typing_context, context, entry, None, annotation, signature, objectmode, lifted, description, library,
-        None, environment, None, reload_init, environments,
+        context.typing_context, context, entry, None, annotation, signature, objectmode, lifted,
+        description, library, None, environment, None, reload_init, environments,
     )  # fmt: skip
 
 

@@ -289,7 +289,8 @@ def _tendon(model: Any, i: int) -> Tendon:
 
 
 ACTIVATIONS = {
-    "mjDYN_NONE": "", "mjDYN_INTEGRATOR": "integrator", "mjDYN_FILTER": "filter", "mjDYN_FILTEREXACT": "filter",
+    "mjDYN_NONE": "", "mjDYN_INTEGRATOR": "integrator", "mjDYN_FILTER": "filter",
+    "mjDYN_FILTEREXACT": "filter",
 }  # fmt: skip
 """MuJoCo's word -> the scene's: how exactly it integrates a filter is a matter of steps."""
 

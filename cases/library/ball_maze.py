@@ -85,7 +85,8 @@ _TITLES = {
     "solve": "in closed loop from the outer channel to the centre",
 }
 _NAMES = (
-    "face below", "tip below -", "tip below +", "face above", "tip above -", "tip above +", "slip below", "slip above",
+    "face below", "tip below -", "tip below +", "face above", "tip above -", "tip above +",
+    "slip below", "slip above",
 )  # fmt: skip
 NORMAL = 6  # number of normal rows; slip rows follow them
 DISCRETE = ("channel", "sector below", "sector above", "controller")

@@ -59,8 +59,9 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     if p["angle"] in (0.0, 180.0, -180.0):
         way[1] = 0.0
     made = case_of(
-        block_on_floor(p, half) if flat else point_on_floor(p, p["radius"]), name="sliding_block", variant=variant,
-        v0=np.concatenate([way, np.zeros(4 if flat else 1)]), t_end=p["t_end"], parameters=parameters,
+        block_on_floor(p, half) if flat else point_on_floor(p, p["radius"]), name="sliding_block",
+        variant=variant, v0=np.concatenate([way, np.zeros(4 if flat else 1)]), t_end=p["t_end"],
+        parameters=parameters,
     )  # fmt: skip
     holds = p["speed"] == 0.0 and not flat and p["mu"] > p["slope"] > 0.0
     down, _, press = field(p, p["slope"])

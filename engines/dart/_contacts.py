@@ -285,8 +285,8 @@ class Rubs:
 
         own = {body.name: self.nodes[body.name].getMass() for body in self.scene.bodies}
         return {
-            "masses": masses(self.scene, own), "gravity": float(np.linalg.norm(self.world.getGravity())), "M": M,
-            "bias": bias, "q0": self.case.q0, "v0": self.case.v0,
+            "masses": masses(self.scene, own), "gravity": float(np.linalg.norm(self.world.getGravity())),
+            "M": M, "bias": bias, "q0": self.case.q0, "v0": self.case.v0,
             "hidden": dict.fromkeys(RIGID, "Its contacts are rigid: they are solved for within a step."),
         }  # fmt: skip
 

@@ -158,8 +158,8 @@ class Reading:
             try:
                 return subprocess.Popen(
                     [self.python, "-P", str(PROCESS), *words, str(self._out), str(BYTES), str(self._nice)],
-                    stdin=subprocess.PIPE,
-                    stdout=told, stderr=told, start_new_session=True, cwd=self._files.name, env=os.environ | single,
+                    stdin=subprocess.PIPE, stdout=told, stderr=told, start_new_session=True,
+                    cwd=self._files.name, env=os.environ | single,
                 )  # fmt: skip
             except OSError as error:
                 self._told.write_text(f"{self.python} cannot be started: {error.strerror}", encoding="utf-8")

@@ -14,11 +14,12 @@ KINDS = {"FreeJoint": "free", "BallJoint": "ball", "RevoluteJoint": "hinge", "Pr
 class _Robot:
     free, ball = "rotation vector, p; world, world", "rotation vector; body"
     hidden = {  # noqa: RUF012
-        "armature": "DART's joints have no armature.", "actuators": "DART's reader makes no actuators of a file.",
+        "armature": "DART's joints have no armature.",
+        "actuators": "DART's reader makes no actuators of a file.",
         "damping v|v|": "DART's dampers are linear.", "damping v^3": "DART's dampers are linear.",
-        "stiffness x^2": "DART's springs are linear.", "stiffness x^3": "DART's springs are linear.",
-        "tendons": "DART has no tendons.", "softness": "DART's rows have no solref.",
-        "keyframes": "DART has no keyframes.",
+        "stiffness x^2": "DART's springs are linear.",
+        "stiffness x^3": "DART's springs are linear.", "tendons": "DART has no tendons.",
+        "softness": "DART's rows have no solref.", "keyframes": "DART has no keyframes.",
         **dict.fromkeys(("spin", "roll", "margin"), "DART's contacts have sliding friction alone."),
     }  # fmt: skip
 

@@ -29,10 +29,12 @@ def kind_of(name: str) -> str:
 class _Robot:
     free, ball = "p, xyzw; body, body", "xyzw; body"
     hidden = {  # noqa: RUF012
-        "stiffness": NO_SPRINGS, "stiffness x^2": NO_SPRINGS, "stiffness x^3": NO_SPRINGS, "rest": NO_SPRINGS,
-        "damping v|v|": "Pinocchio's dampers are linear.", "damping v^3": "Pinocchio's dampers are linear.",
+        "stiffness": NO_SPRINGS, "stiffness x^2": NO_SPRINGS, "stiffness x^3": NO_SPRINGS,
+        "rest": NO_SPRINGS, "damping v|v|": "Pinocchio's dampers are linear.",
+        "damping v^3": "Pinocchio's dampers are linear.",
         "actuators": "Pinocchio's model has no actuators.", "tendons": "Pinocchio's model has no tendons.",
-        "surfaces": "Pinocchio's shapes have no friction.", "softness": "Pinocchio's reader leaves solref out.",
+        "surfaces": "Pinocchio's shapes have no friction.",
+        "softness": "Pinocchio's reader leaves solref out.",
     }  # fmt: skip
 
     def __init__(self, path: str, urdf: bool) -> None:
@@ -87,7 +89,8 @@ class _Robot:
         for name, _, kind, at, first in self.joints:
             bounded, dof = kind in ("hinge", "slide"), slice(first, first + {"free": 6, "ball": 3}.get(kind, 1))
             values = {
-                "armature": m.armature[dof], "damping": m.damping[dof], "friction": m.upperDryFrictionLimit[dof],
+                "armature": m.armature[dof], "damping": m.damping[dof],
+                "friction": m.upperDryFrictionLimit[dof],
                 "lower": m.lowerPositionLimit[at] if bounded else -np.inf,
                 "upper": m.upperPositionLimit[at] if bounded else np.inf,
                 "least force": m.lowerEffortLimit[first], "most force": m.upperEffortLimit[first],

@@ -79,7 +79,8 @@ def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, .
     return (
         Tangent(way="mjd_transitionFD, centred, its step undone", slope=exact),
         Tangent(
-            way="mjd_transitionFD, one-sided, logarithm", slope=plain, explained=_logarithm(_step(exact, dt), dt),
+            way="mjd_transitionFD, one-sided, logarithm", slope=plain,
+            explained=_logarithm(_step(exact, dt), dt),
             known=f"The logarithm of Euler's step over dt = {dt:.2g} s is off by O(dt).",
         ),
     )  # fmt: skip

@@ -217,11 +217,9 @@ def build(
     hook = _hook(integrated, data, switched, driver)
     prepared = Prepared(
         model=model, data=data, nc=len(case.contacts), start=_start(case, data, rows, acting, driver),
-        modes=rows.modes, lam=rows.lam,
-        safe=_guard(integrated, data, rows),
-        observe=rows.observe(), instants=acting.instants, change=_change(scene, data, acting, driver),
-        acting=acting,
-        hook=hook, always=driver is not None or case.force is not None or (switched is not None and switched.wakeful),
+        modes=rows.modes, lam=rows.lam, safe=_guard(integrated, data, rows), observe=rows.observe(),
+        instants=acting.instants, change=_change(scene, data, acting, driver), acting=acting, hook=hook,
+        always=driver is not None or case.force is not None or (switched is not None and switched.wakeful),
         machine="level" if switched else "memoryless",
     )  # fmt: skip
     if gated is not None:

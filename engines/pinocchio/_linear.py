@@ -150,7 +150,8 @@ def of_rows(rows: PinRows, spot: Spot, more: tuple[float, ...] = (), rates: tupl
 
     return Stand(
         model=rows.model, data=rows.data, q=np.append(spot.q, more), v=np.append(spot.v, rates),
-        chart=same(len(spot.q), len(more)), force=force, jacobian=lambda q: np.array(rows.jacobian(q)[on]), law=law,
+        chart=same(len(spot.q), len(more)), force=force,
+        jacobian=lambda q: np.array(rows.jacobian(q)[on]), law=law,
     )  # fmt: skip
 
 

@@ -143,7 +143,8 @@ def _of_gates(case: Case, gated: Gated, bodies: Bodies, law: Law, algebra: str) 
     gated.begin(case.q0)
     pinned = PinRows(
         bodies.model, lambda q: gated.gradients(q)[1], lambda q: gated.gradients(q)[0],
-        lambda q, v: gated.at(q, v)[2], law=law, algebra=algebra, forces=None if bodies.none else bodies.apply,
+        lambda q, v: gated.at(q, v)[2], law=law, algebra=algebra,
+        forces=None if bodies.none else bodies.apply,
         follows=gated.gates.follows, gradient_of=gated.gradient_of,
     )  # fmt: skip
     pinned.ways = gated

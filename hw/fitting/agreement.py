@@ -56,8 +56,9 @@ def agreement(
         probability = float(2.0 * stats.t.sf(z, count))
         start = float(x[free[j]])
         found.append(Agreement(
-            name=names[free[j]], values=(start + float(a[j]), start + float(b[j])), stds=(float(s[j]), float(t[j])),
-            probability=probability, agrees=probability >= DIFFERENT / len(both),
+            name=names[free[j]], values=(start + float(a[j]), start + float(b[j])),
+            stds=(float(s[j]), float(t[j])), probability=probability,
+            agrees=probability >= DIFFERENT / len(both),
         ))  # fmt: skip
     return tuple(found)
 

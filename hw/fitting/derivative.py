@@ -49,8 +49,8 @@ class Exact:
     deadline = Deadline()
 
     def __init__(
-        self, model: Model, numbers: Mapping[str, Value], free: Sequence[str], cut: Sequence[Window], starts: bool,
-        stride: int,
+        self, model: Model, numbers: Mapping[str, Value], free: Sequence[str],
+        cut: Sequence[Window], starts: bool, stride: int,
     ) -> None:  # fmt: skip
         self.model, self.numbers, self.free, self.cut = model, dict(numbers), tuple(free), tuple(cut)
         for name in free:
@@ -156,8 +156,8 @@ class Exact:
         out[0] = lift(system, self.model.seen, q0, y, yd, p)
         with np.errstate(all="ignore"):
             march(
-                system.dynamics, system.rows, np.ascontiguousarray(times), self.parts, u, p, np.array(system.alpha),
-                system.mass_block, system.scratch, out,
+                system.dynamics, system.rows, np.ascontiguousarray(times), self.parts, u, p,
+                np.array(system.alpha), system.mass_block, system.scratch, out,
             )  # fmt: skip
         return times, out
 

@@ -43,8 +43,8 @@ class Differences:
     deadline = Deadline()
 
     def __init__(
-        self, model: Model, numbers: Mapping[str, Value], free: Sequence[str], cut: Sequence[Window], starts: bool,
-        stride: int, engine: str,
+        self, model: Model, numbers: Mapping[str, Value], free: Sequence[str],
+        cut: Sequence[Window], starts: bool, stride: int, engine: str,
     ) -> None:  # fmt: skip
         for name in free:
             if name not in model.parameters:

@@ -30,9 +30,10 @@ MOST_DERIVATIVES = 20_000_000
 
 @checked_arguments
 def identify(
-    log: Log | Sequence[Log], model: str | Model, free: Sequence[str], *, parameters: Mapping[str, Value] | None = None,
-    restart: float | None = None, horizon: float | None = None, starts: str = "auto", hold: int = 2,
-    stride: int = 1, bounds: Mapping[str, tuple[float, float]] | None = None, engine: str = "",
+    log: Log | Sequence[Log], model: str | Model, free: Sequence[str], *,
+    parameters: Mapping[str, Value] | None = None, restart: float | None = None,
+    horizon: float | None = None, starts: str = "auto", hold: int = 2, stride: int = 1,
+    bounds: Mapping[str, tuple[float, float]] | None = None, engine: str = "",
     delay: float = 0.0, budget: float = BUDGET, time_limit: float = math.inf,
 ) -> Fit:  # fmt: skip
     """Fit parameters to a log.

@@ -105,26 +105,27 @@ def unjudged(search: Search, seconds: float) -> Fit:
     message = f"Stopped at the time limit of {seconds:g} s: {ended}"
     estimates = tuple(
         Estimate(
-            name=name, unit="s" if name == DELAY else search.model.parameters[name].unit, value=float(found.x[i]),
-            std=np.inf, low=-np.inf, high=np.inf, start=float(search.x0[i]), identifiable=False, kept_low=-np.inf,
-            kept_high=np.inf, freedom=0.0, bounds=(float(search.limits[0][i]), float(search.limits[1][i])),
+            name=name, unit="s" if name == DELAY else search.model.parameters[name].unit,
+            value=float(found.x[i]), std=np.inf, low=-np.inf, high=np.inf,
+            start=float(search.x0[i]), identifiable=False, kept_low=-np.inf, kept_high=np.inf,
+            freedom=0.0, bounds=(float(search.limits[0][i]), float(search.limits[1][i])),
         ) for i, name in enumerate(free)
     )  # fmt: skip
     values = {e.name: e.value for e in estimates if e.name != DELAY}
     nothing = dict.fromkeys(ERRORS, (np.nan, np.nan))
     return Fit(
-        model=search.model.name, estimates=estimates, correlation=np.full((len(free), len(free)), np.nan), kept=(),
-        unseen=(), agreement=(), parameters=dict(search.numbers) | values,
-        delay=float(found.x[free.index(DELAY)]) if DELAY in free else 0.0, fitted=search.fitted, held=search.held,
-        before=nothing, after=dict(nothing), sensitivities=search.problem.how, covariance="none: stopped",
-        warnings=(f"{message} No interval and no error was found.",), evaluations=found.evaluations, outcome=STOPPED,
-        message=message,
+        model=search.model.name, estimates=estimates, correlation=np.full((len(free), len(free)), np.nan),
+        kept=(), unseen=(), agreement=(), parameters=dict(search.numbers) | values,
+        delay=float(found.x[free.index(DELAY)]) if DELAY in free else 0.0, fitted=search.fitted,
+        held=search.held, before=nothing, after=dict(nothing), sensitivities=search.problem.how,
+        covariance="none: stopped", warnings=(f"{message} No interval and no error was found.",),
+        evaluations=found.evaluations, outcome=STOPPED, message=message,
     )  # fmt: skip
 
 
 def _estimates(
-    search: Search, spread: Scatter, own: NDArray[np.int64], blind: NDArray[np.bool_], open_: NDArray[np.bool_],
-    flat: Mapping[int, str],
+    search: Search, spread: Scatter, own: NDArray[np.int64], blind: NDArray[np.bool_],
+    open_: NDArray[np.bool_], flat: Mapping[int, str],
 ) -> Iterator[Estimate]:  # fmt: skip
     """One estimate a parameter; `own` says which unknowns the scatter is of."""
     place = {int(i): j for j, i in enumerate(own)}
@@ -137,9 +138,10 @@ def _estimates(
         wide = np.inf if open_[i] else half
         bounds = (float(search.limits[0][i]), float(search.limits[1][i]))
         yield Estimate(
-            name=name, unit="s" if name == DELAY else search.model.parameters[name].unit, value=value,
-            std=np.inf if np.isinf(wide) else std, low=value - wide, high=value + wide, start=float(search.x0[i]),
-            bounds=bounds, identifiable=_identifiable(value, wide, bounds) and i not in flat,
+            name=name, unit="s" if name == DELAY else search.model.parameters[name].unit,
+            value=value, std=np.inf if np.isinf(wide) else std, low=value - wide,
+            high=value + wide, start=float(search.x0[i]), bounds=bounds,
+            identifiable=_identifiable(value, wide, bounds) and i not in flat,
             kept_low=value - half, kept_high=value + half, freedom=freedom,
         )  # fmt: skip
 

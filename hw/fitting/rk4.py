@@ -101,8 +101,8 @@ def _accelerate(
 
 @kernels.helper
 def _step(
-    dynamics: Any, rows: Any, t: float, step: float, y: Array, u: Array, p: Array, law: Floats, idx: Any, k: int,
-    work: Any, stages: Array,
+    dynamics: Any, rows: Any, t: float, step: float, y: Array, u: Array, p: Array, law: Floats,
+    idx: Any, k: int, work: Any, stages: Array,
 ) -> None:  # fmt: skip
     """Carry y on by one step in place; stages (3, 2 n) is scratch."""
     z, slope, total = stages[0], stages[1], stages[2]
@@ -121,8 +121,8 @@ def _step(
 
 
 def march(
-    dynamics: Any, rows: Any, times: Floats, parts: int, u: Array, p: Array, law: Floats, k: int, scratch: int,
-    out: Array,
+    dynamics: Any, rows: Any, times: Floats, parts: int, u: Array, p: Array, law: Floats,
+    k: int, scratch: int, out: Array,
 ) -> None:  # fmt: skip
     """Fill out[1:] from out[0], `parts` steps between two times; u[i] acts from times[i] on.
 

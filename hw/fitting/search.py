@@ -138,21 +138,21 @@ def _descend(timed: _Timed, limits: tuple[Floats, Floats], scale: Any, kept: Seq
     active = np.zeros(len(x0), dtype=bool)
     if not np.any(part):
         return Found(
-            x=x0, residual=problem.residual(x0), kept=tuple(kept), active=active, evaluations=timed.evaluations,
-            success=True, message="Nothing is left to search for.",
+            x=x0, residual=problem.residual(x0), kept=tuple(kept), active=active,
+            evaluations=timed.evaluations, success=True, message="Nothing is left to search for.",
         )  # fmt: skip
     bounds = (limits[0][part], limits[1][part])
     try:
         ftol = max(problem.ftol, NOISE / len(timed.residual(x0[part])))
         ended = least_squares(
-            timed.residual, x0[part], jac=timed.jacobian, bounds=bounds, x_scale=scale(x0)[part], method="trf",
-            xtol=problem.ftol, ftol=ftol, gtol=1e-12, max_nfev=problem.most,
+            timed.residual, x0[part], jac=timed.jacobian, bounds=bounds, x_scale=scale(x0)[part],
+            method="trf", xtol=problem.ftol, ftol=ftol, gtol=1e-12, max_nfev=problem.most,
         )  # fmt: skip
     except _Spent:
         message = f"The time for the search was over after {timed.evaluations} runs of all windows."
         return timed.best_so_far(kept, message, limits)
     active[part] = ended.active_mask != 0
     return Found(
-        x=timed.whole(ended.x), residual=ended.fun, kept=tuple(kept), active=active, evaluations=timed.evaluations,
-        success=bool(ended.success), message=str(ended.message),
+        x=timed.whole(ended.x), residual=ended.fun, kept=tuple(kept), active=active,
+        evaluations=timed.evaluations, success=bool(ended.success), message=str(ended.message),
     )  # fmt: skip

@@ -111,8 +111,8 @@ class HdfReader:
             dtype = item.dtype[field] if field else item.dtype
             self._tables.append(
                 Table(
-                    key=key, name=f"{name}{self._joint}{field}" if field else name, type=dtype.name, rows=rows,
-                    width=width, axis=axis, unit=unit, field=field,
+                    key=key, name=f"{name}{self._joint}{field}" if field else name,
+                    type=dtype.name, rows=rows, width=width, axis=axis, unit=unit, field=field,
                 )
             )  # fmt: skip
 

@@ -49,8 +49,8 @@ def build(numbers: Numbers, segment: Segment) -> Case:
         inputs = Inputs(names=NAMES, times=segment.times, values=u)
     return Case(
         name="delta", variant="replay", title=TITLE, mechanism="delta", parameters=robot,
-        coordinates=tuple(Coordinate(name=joint, unit="rad") for joint in JOINTS), contacts=LOOPS, q0=q0, v0=v0,
-        t_end=segment.t_end, inputs=inputs, law=_law(numbers), form=in_tree,
+        coordinates=tuple(Coordinate(name=joint, unit="rad") for joint in JOINTS), contacts=LOOPS,
+        q0=q0, v0=v0, t_end=segment.t_end, inputs=inputs, law=_law(numbers), form=in_tree,
     )  # fmt: skip
 
 

@@ -116,8 +116,8 @@ def make_plan(path: Path, reader: Reader, columns: Columns) -> Plan:
     if columns.part and found.column(columns.part)[0] is not group:
         raise LogFormatError(path, "tells the parts but stands in other rows than the times.", column=columns.part)
     return Plan(
-        path=path, columns=columns, group=group, sources=sources, time_column=time.column, ticks=ticks, step=step,
-        start=group.start if not time.column else 0.0,
+        path=path, columns=columns, group=group, sources=sources, time_column=time.column,
+        ticks=ticks, step=step, start=group.start if not time.column else 0.0,
         told=counted or time.unit is not None or time.scale != 1.0 or bool(found.column(time.column)[1].unit),
     )  # fmt: skip
 

@@ -234,8 +234,8 @@ def _clock(source: Source) -> tuple[str, str]:
 
 def _channel(source: Source, values: Floats) -> Channel:
     return Channel(
-        role=source.role, name=source.name, unit=source.conversion.si, values=values, delay=source.signal.delay,
-        column=source.signal.column, range=source.range,
+        role=source.role, name=source.name, unit=source.conversion.si, values=values,
+        delay=source.signal.delay, column=source.signal.column, range=source.range,
     )  # fmt: skip
 
 

@@ -89,8 +89,8 @@ def _hash(names: Iterable[str], units: Iterable[str], columns: Iterable[Floats])
 def _encode(log: Log, content: str) -> bytes:
     channels = [{k: getattr(c, k) for k in ("role", "name", "unit", "delay", "column", "range")} for c in log.channels]
     about = {
-        "version": VERSION, "sample_time": log.sample_time, "content": content, "provenance": asdict(log.provenance),
-        "channels": channels, "filled": log.filled.tolist(),
+        "version": VERSION, "sample_time": log.sample_time, "content": content,
+        "provenance": asdict(log.provenance), "channels": channels, "filled": log.filled.tolist(),
     }  # fmt: skip
     return json.dumps(about).encode()
 

@@ -176,8 +176,8 @@ class Comparison:
     def _of(self, prediction: Prediction) -> Iterator[Row]:
         def row(metric: str, value: float, unit: str, channel: str = "") -> Row:
             return Row(
-                engine=prediction.engine, profile=prediction.profile, metric=metric, channel=channel, value=value,
-                unit=unit,
+                engine=prediction.engine, profile=prediction.profile, metric=metric,
+                channel=channel, value=value, unit=unit,
             )  # fmt: skip
 
         y, left = deviation(self.measured, self.turns), self.residual(prediction)
@@ -260,9 +260,9 @@ class Comparison:
         n = sum(len(w.t) for w in self.windows)
         nothing = np.zeros((n, 0))
         return Trajectory(
-            t=self.time - self.windows[0].t[0], q=np.concatenate(y), v=np.concatenate(yd), gap=nothing, lam=nothing,
-            energy=np.full((n, 2), np.nan), mode=nothing.astype(np.int8), outcome=outcome, message=message,
-            steps=steps, wall_s=wall_s,
+            t=self.time - self.windows[0].t[0], q=np.concatenate(y), v=np.concatenate(yd),
+            gap=nothing, lam=nothing, energy=np.full((n, 2), np.nan), mode=nothing.astype(np.int8),
+            outcome=outcome, message=message, steps=steps, wall_s=wall_s,
         )  # fmt: skip
 
 

@@ -33,9 +33,10 @@ KINDS = ("forward", "closed_loop")
 
 @checked_arguments
 def replay(
-    log: Log, model: str | Model, *, kind: str = "forward", wanted: Sequence[str] = ("reference",),
-    parameters: Mapping[str, Value] | None = None, restart: float | None = None, horizon: float | None = None,
-    delay: float = 0.0, settings: Mapping[str, Any] | None = None, tell: Callable[[str], None] = lambda _: None,
+    log: Log, model: str | Model, *, kind: str = "forward",
+    wanted: Sequence[str] = ("reference",), parameters: Mapping[str, Value] | None = None,
+    restart: float | None = None, horizon: float | None = None, delay: float = 0.0,
+    settings: Mapping[str, Any] | None = None, tell: Callable[[str], None] = lambda _: None,
     keep: Callable[[str, Callable[[], Prediction]], Prediction] = lambda _, predict: predict(),
 ) -> Comparison:  # fmt: skip
     """Run a model through a log.
@@ -86,10 +87,10 @@ def replay(
             skipped[name, profile] = str(error)
     return Comparison(
         log=log, model=chosen.name, title=chosen.title, kind=kind, parameters=MappingProxyType(numbers),
-        units=MappingProxyType({k: p.unit for k, p in chosen.parameters.items()}), coordinates=chosen.measured,
-        windows=cut, predictions=tuple(predictions), skipped=MappingProxyType(skipped), delay=delay,
-        falls=chosen.falls, mass=float(numbers.get("mass", 1.0)), limits=chosen.limits,
-        turns=chosen.turns,
+        units=MappingProxyType({k: p.unit for k, p in chosen.parameters.items()}),
+        coordinates=chosen.measured, windows=cut, predictions=tuple(predictions),
+        skipped=MappingProxyType(skipped), delay=delay, falls=chosen.falls,
+        mass=float(numbers.get("mass", 1.0)), limits=chosen.limits, turns=chosen.turns,
     )  # fmt: skip
 
 

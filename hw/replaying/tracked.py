@@ -26,8 +26,8 @@ from crossbody.reference.linear import Unknown, filtered
 
 @checked_arguments
 def track_force(
-    log: Log, model: str | Model, *, size: float, memory: float, parameters: Mapping[str, Value] | None = None,
-    delay: float = 0.0, stride: int = 1,
+    log: Log, model: str | Model, *, size: float, memory: float,
+    parameters: Mapping[str, Value] | None = None, delay: float = 0.0, stride: int = 1,
 ) -> Inferred:  # fmt: skip
     """The force that acts on the mechanism besides the recorded torques, from positions and torques.
 
@@ -56,8 +56,8 @@ def track_force(
     u[:, :own] = _means(log.time, recorded_inputs(log, chosen), t[kept])
     found = filtered(
         system, t[kept], y[kept], u, unknown=Unknown(inputs=tuple(range(own, own + len(chosen.forces)))),
-        measured=chosen.seen, std_y=noise_of(log.time, y, HALF, DEGREE), q0=case.q0, v0=case.v0, std_force=size,
-        time_force=memory,
+        measured=chosen.seen, std_y=noise_of(log.time, y, HALF, DEGREE), q0=case.q0, v0=case.v0,
+        std_force=size, time_force=memory,
     )  # fmt: skip
     nothing = np.full(found.force.shape, np.nan)
     return Inferred(

@@ -83,8 +83,8 @@ def delta_plant(pushes: Iterable[Push] = (), **parameters: float | int | str | b
     path = scene.path_of(case.parameters)
     assert path is not None  # the case has a sampled controller
     return Plant(
-        case=case, engine=" ".join(("mujoco", *engine.versions.values())), trajectory=motion, t=ticks, q=q, v=v,
-        u=_torques(case, ticks, q, v), force=_forces(case, ticks), r=path(ticks)[0],
+        case=case, engine=" ".join(("mujoco", *engine.versions.values())), trajectory=motion, t=ticks,
+        q=q, v=v, u=_torques(case, ticks, q, v), force=_forces(case, ticks), r=path(ticks)[0],
     )  # fmt: skip
 
 

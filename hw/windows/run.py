@@ -25,7 +25,8 @@ def run_once(case: Case, solver: str, **options: Any) -> Trajectory:
     """
     given = case.inputs
     return simulate(
-        system_of(case), case.q0, case.v0, case.t_end, solver=solver, fsm=case.fsm, collisions=case.collisions,
+        system_of(case), case.q0, case.v0, case.t_end, solver=solver, fsm=case.fsm,
+        collisions=case.collisions,
         inputs=None if given is None else (given.times, given.values), **options,
     )  # fmt: skip
 

@@ -26,8 +26,8 @@ FOUND, ILL_POSED, MISSED = np.arange(3)
 
 @compiled
 def residual(
-    M: Array, f: Array, H: Array, h: Array, drift: Array, v: Array, law: Floats, vd: Floats, lam: Floats, k: int,
-    moves: bool, out: Floats,
+    M: Array, f: Array, H: Array, h: Array, drift: Array, v: Array, law: Floats, vd: Floats,
+    lam: Floats, k: int, moves: bool, out: Floats,
 ) -> None:  # fmt: skip
     """Out (n + na,): imaginary parts of (M v' - f - H^T lam; H v' + H' v + a1 H v + (a0 + a2 h^2) h) over STEP.
 
@@ -93,8 +93,9 @@ def steps(colours: Index, count: int, probe: Floats, n: int, na: int) -> tuple[F
 
 
 def tangents(
-    dynamics: Any, rows: Any, k: int, t: float, X: Floats, P: Array, w: Array, law: Floats, idx: Index,
-    colours: Index, count: int, pattern: Bytes, probe: Floats, vd: Floats, lam: Floats, out: Floats, codes: Index,
+    dynamics: Any, rows: Any, k: int, t: float, X: Floats, P: Array, w: Array, law: Floats,
+    idx: Index, colours: Index, count: int, pattern: Bytes, probe: Floats, vd: Floats,
+    lam: Floats, out: Floats, codes: Index,
 ) -> None:  # fmt: skip
     """Accelerations, multipliers and their derivatives at every line of X.
 

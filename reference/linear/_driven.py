@@ -50,8 +50,8 @@ class Driven:
         lam_a, lam_u = self.split(found.lam_u)
         size_a, size_u = self.split(found.size[:, n2:])
         return replace(
-            found, vd_x=np.hstack([found.vd_x, by_a]), vd_u=by_u, lam_x=np.hstack([found.lam_x, lam_a]), lam_u=lam_u,
-            gap_x=np.hstack([found.gap_x, none]), rate_x=np.hstack([found.rate_x, none]),
+            found, vd_x=np.hstack([found.vd_x, by_a]), vd_u=by_u, lam_x=np.hstack([found.lam_x, lam_a]),
+            lam_u=lam_u, gap_x=np.hstack([found.gap_x, none]), rate_x=np.hstack([found.rate_x, none]),
             size=np.hstack([found.size[:, :n2], size_a, size_u]),
         )  # fmt: skip
 

@@ -21,9 +21,9 @@ from crossbody.reference.linear.linearisation import point
 @checked_arguments
 def filtered(
     system: System, t: ArrayLike, y: ArrayLike, u: ArrayLike | None = None, *, unknown: Unknown,
-    measured: Sequence[int], std_y: ArrayLike, q0: ArrayLike, v0: ArrayLike | None = None, std_force: ArrayLike,
-    time_force: float, active: Sequence[int] | None = None, std_q0: float = 1e-3, std_v0: float = 1e-1,
-    smooth: bool = True,
+    measured: Sequence[int], std_y: ArrayLike, q0: ArrayLike, v0: ArrayLike | None = None,
+    std_force: ArrayLike, time_force: float, active: Sequence[int] | None = None,
+    std_q0: float = 1e-3, std_v0: float = 1e-1, smooth: bool = True,
 ) -> Estimate:  # fmt: skip
     """Forces from positions alone by an extended Kalman filter, and a smoother over the record.
 

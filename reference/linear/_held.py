@@ -83,9 +83,9 @@ def unpacked(M: Array, k: int, mass: Floats) -> None:
 
 
 def held(
-    dynamics: Any, rows: Any, k: int, t: float, Q: Floats, P: Array, w: Array, idx: Index, hold: Index,
-    colours: Index, count: int, pattern: Bytes, probe: Floats, u: Floats, lam: Floats, basis: Floats, A: Floats,
-    codes: Index,
+    dynamics: Any, rows: Any, k: int, t: float, Q: Floats, P: Array, w: Array, idx: Index,
+    hold: Index, colours: Index, count: int, pattern: Bytes, probe: Floats, u: Floats,
+    lam: Floats, basis: Floats, A: Floats, codes: Index,
 ) -> None:  # fmt: skip
     """Inputs, multipliers and the reduced first-order model at every line of Q, at rest.
 

@@ -63,8 +63,8 @@ class Filter:
         if smooth:
             smoothed(z, P, before, ahead, moves)
         return Estimate(
-            t=self.record.t, force=z[:, 2 * n :], covariance=P[:, 2 * n :, 2 * n :], q=z[:, :n], v=z[:, n : 2 * n],
-            innovation=innovation,
+            t=self.record.t, force=z[:, 2 * n :], covariance=P[:, 2 * n :, 2 * n :], q=z[:, :n],
+            v=z[:, n : 2 * n], innovation=innovation,
         )  # fmt: skip
 
     def _predict(self, k: int) -> Floats:

@@ -99,8 +99,9 @@ class Sensitivity:
 
 @checked_arguments
 def sensitivity(
-    system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, *, parameters: Sequence[str] = (),
-    u: ArrayLike | None = None, rtol: float = 1e-11, collisions: str = "sequential", max_steps: int = 1_000_000,
+    system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, *,
+    parameters: Sequence[str] = (), u: ArrayLike | None = None, rtol: float = 1e-11,
+    collisions: str = "sequential", max_steps: int = 1_000_000,
 ) -> Sensitivity:  # fmt: skip
     """Integrate a motion with its variational equations; every event multiplies them by its saltation matrix.
 
@@ -143,8 +144,8 @@ def sensitivity(
     elif not (_same(walk.x[:nq], run.q) and _same(walk.x[nq:], run.v)):
         raise SceneError(AS_ONE)  # touching rows share an impulse of which one event tells
     return Sensitivity(
-        run=run, state=walk.x, by_start=walk.S[:, : 2 * n], by_parameters=walk.S[:, 2 * n :], names=over.names,
-        jumps=tuple(walk.jumps), outcome=outcome, message=walk.message or run.message,
+        run=run, state=walk.x, by_start=walk.S[:, : 2 * n], by_parameters=walk.S[:, 2 * n :],
+        names=over.names, jumps=tuple(walk.jumps), outcome=outcome, message=walk.message or run.message,
     )  # fmt: skip
 
 
@@ -200,7 +201,8 @@ class _Walk:
         fast = (np.array(modes) == Mode.COLLISION) & (np.asarray(system.b0) > 0.0)
         at = replace(
             self.at, q=self.x[:nq].copy(), v=self.x[nq:].copy(), t=t,
-            alpha=np.where(fast[:, None], system.beta, system.alpha), idle=NO_ROWS, sharing=NO_ROWS, emerging=NO_ROWS,
+            alpha=np.where(fast[:, None], system.beta, system.alpha), idle=NO_ROWS,
+            sharing=NO_ROWS, emerging=NO_ROWS,
             active=np.array([i for i, mode in enumerate(modes) if mode in ACTIVE], dtype=np.int64),
         )  # fmt: skip
         return self.slipping.directed(at, modes, self._sample(t, side)) if system.frictional else at

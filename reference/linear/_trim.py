@@ -88,8 +88,8 @@ def trim(
         & (np.asarray(system.a0)[at.active] > 0)
     )
     return Trim(
-        q=_placed(at, x[:n]), v=x[n : 2 * n], u=x[2 * n : 2 * n + nu], lam=lam, active=at.active, residual=left,
-        outcome=outcome, pulling=tuple(at.active[pulls].tolist()),
+        q=_placed(at, x[:n]), v=x[n : 2 * n], u=x[2 * n : 2 * n + nu], lam=lam, active=at.active,
+        residual=left, outcome=outcome, pulling=tuple(at.active[pulls].tolist()),
     )  # fmt: skip
 
 

@@ -109,8 +109,8 @@ def linearise(
 
 
 def point(
-    system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None, active: Sequence[int] | None, t: float,
-    colliding: Sequence[int] = (), sliding: Sequence[int] = (), *, driven: bool = False,
+    system: System, q: ArrayLike, v: ArrayLike | None, u: ArrayLike | None, active: Sequence[int] | None,
+    t: float, colliding: Sequence[int] = (), sliding: Sequence[int] = (), *, driven: bool = False,
 ) -> Point:  # fmt: skip
     """Where to linearise, checked; `driven` where activations are known.
 

@@ -16,8 +16,8 @@ CONSTANTS = (
 )  # fmt: skip
 """Names of the constants, SI; gravity is that in the plane of the maze, gains and model those of the controller."""
 (
-    G, MB, RADIUS, JB, JM, DRAG, RINGS, KIND, A_MAX, U_MAX, WN, OMEGA, K2, K1, K0, C2, C1, C0, MODEL_G, MODEL_MB,
-    MODEL_JM, DELAY, NOISE, NOISE_SPEED, SEED,
+    G, MB, RADIUS, JB, JM, DRAG, RINGS, KIND, A_MAX, U_MAX, WN, OMEGA, K2, K1, K0, C2, C1, C0,
+    MODEL_G, MODEL_MB, MODEL_JM, DELAY, NOISE, NOISE_SPEED, SEED,
 ) = range(len(CONSTANTS))  # fmt: skip
 
 TABLE, STRIDE = len(CONSTANTS), 5

@@ -56,8 +56,8 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
         law: of the one row.
     """
     return System(
-        n=1, parameters={name: float(parameters[name]) for name in ("mass", "gravity")},
-        a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral, constant_mass=True, affine=True, **KERNELS,
+        n=1, parameters={name: float(parameters[name]) for name in ("mass", "gravity")}, a0=law.a0,
+        a1=law.a1, a2=law.a2, unilateral=law.unilateral, constant_mass=True, affine=True, **KERNELS,
     )  # fmt: skip
 
 

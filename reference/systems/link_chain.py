@@ -134,8 +134,9 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
         raise SceneError(f"A chain of {n} links has {2 * n} rows; the law has {len(law.a0)}.")
     span = [[max(0, 3 * i - 3), 3 * i + 3] for i in range(n) for _ in range(2)]
     return System(
-        n=3 * n, parameters={name: float(parameters[name]) for name in names(n)}, a0=law.a0, a1=law.a1, a2=law.a2,
-        unilateral=law.unilateral, span=span, inputs=n, mass_block=1, constant_mass=True, **KERNELS,
+        n=3 * n, parameters={name: float(parameters[name]) for name in names(n)}, a0=law.a0,
+        a1=law.a1, a2=law.a2, unilateral=law.unilateral, span=span, inputs=n, mass_block=1,
+        constant_mass=True, **KERNELS,
     )  # fmt: skip
 
 

@@ -108,9 +108,8 @@ def build(parameters: Mapping[str, Any], law: Law) -> System:
         law: of the two rows.
     """
     return System(
-        n=len(COORDINATES), parameters=_fingers.values(parameters, PARAMETERS),
-        a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral, mass_block=1, inputs=1, constant_mass=True,
-        **KERNELS,
+        n=len(COORDINATES), parameters=_fingers.values(parameters, PARAMETERS), a0=law.a0, a1=law.a1,
+        a2=law.a2, unilateral=law.unilateral, mass_block=1, inputs=1, constant_mass=True, **KERNELS,
     )  # fmt: skip
 
 

@@ -86,8 +86,8 @@ def _response(panels: Panels, line: pd.DataFrame, name: str, i: int, column: int
     style = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.8}
     for row, value in enumerate(("magnitude", "phase"), start=1):
         panels.add(
-            row, column, x=line["omega"], y=line[value], name=name, legendgroup=name, showlegend=row == column == 1,
-            mode="lines", line=style,
+            row, column, x=line["omega"], y=line[value], name=name, legendgroup=name,
+            showlegend=row == column == 1, mode="lines", line=style,
         )  # fmt: skip
 
 

@@ -243,7 +243,8 @@ def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int
         if not sliding and system.activations is None:
             return _place(case, name, list(rows), held=not one_way, q=run.q[k], t=t)
         model = linearise(
-            system, run.q[k], run.v[k], u, list(rows), sliding=sliding, t=t, activations=_activations(case, system, t),
+            system, run.q[k], run.v[k], u, list(rows), sliding=sliding, t=t,
+            activations=_activations(case, system, t),
             names=[coordinate.name for coordinate in case.velocities],
         )  # fmt: skip
     except SceneError as error:
@@ -253,8 +254,8 @@ def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int
         residual=np.nan, outcome=Outcome.ILL_POSED if why else Outcome.FINISHED, pulling=(),
     )  # fmt: skip
     return Place(
-        name=f"{name}, moving", case=case, system=system, trim=passed, model=model, t=t, held=False, powered=True,
-        why=why,
+        name=f"{name}, moving", case=case, system=system, trim=passed, model=model, t=t,
+        held=False, powered=True, why=why,
     )  # fmt: skip
 
 

@@ -20,8 +20,8 @@ from crossbody.reports.runs.choice import Pick
 GRID = 2001  # instants at which all engines are compared alike
 
 PARTS = {
-    "error_q": "position", "error_v": "velocity", "error_impulse": "lam_impulse", "error_energy": "energy_drift",
-    "error_times": "event_times",
+    "error_q": "position", "error_v": "velocity", "error_impulse": "lam_impulse",
+    "error_energy": "energy_drift", "error_times": "event_times",
 }  # fmt: skip
 
 

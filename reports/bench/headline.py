@@ -13,8 +13,9 @@ from crossbody.reports.bench.order import FLOOR
 
 REFERENCE = ("reference", "compiled")
 COLUMNS = [
-    "case", "engine", "profile", "tier", "against", "knob", "setting", "best_error", "engine_ms", "reference_error",
-    "reference_ms", "ratio", "ratio_call", "ratio_native", "least_ratio", "least_error", "interpreted", "ahead", "says",
+    "case", "engine", "profile", "tier", "against", "knob", "setting", "best_error",
+    "engine_ms", "reference_error", "reference_ms", "ratio", "ratio_call", "ratio_native",
+    "least_ratio", "least_error", "interpreted", "ahead", "says",
 ]  # fmt: skip
 
 
@@ -81,8 +82,9 @@ def _level(ours: pd.DataFrame, rung: Mapping[Any, Any]) -> dict[str, Any]:
     cheapest = good.iloc[int(np.argmin(good["median_ms"].astype(float)))]
     ms, call = float(cheapest["median_ms"]), float(good["call_ms"].astype(float).min())
     return found | {
-        "reference_error": float(cheapest["error"]), "reference_ms": ms, "ratio": float(rung["median_ms"]) / ms,
-        "ratio_call": float(rung["call_ms"]) / call, "ratio_native": float(rung.get("native_ms", math.nan)) / ms,
+        "reference_error": float(cheapest["error"]), "reference_ms": ms,
+        "ratio": float(rung["median_ms"]) / ms, "ratio_call": float(rung["call_ms"]) / call,
+        "ratio_native": float(rung.get("native_ms", math.nan)) / ms,
     }  # fmt: skip
 
 

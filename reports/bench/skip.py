@@ -171,8 +171,8 @@ def _bounces(_repeats: int) -> Iterator[Row]:
     held = [sum(a.nbytes for of in (run.buffers, run.work) for a in of.values()) for run in (few, many)]
     per = {name: wall / 1e6 for name, wall in took.items()}
     yield ratio(
-        "time of a bounce, 1e6 over 1e5 of them", per["1e6"] / per["1e5"], 1.2, _beside(per, 1e6, "us a bounce"),
-        "a step costs the same at any time",
+        "time of a bounce, 1e6 over 1e5 of them", per["1e6"] / per["1e5"], 1.2,
+        _beside(per, 1e6, "us a bounce"), "a step costs the same at any time",
     )  # fmt: skip
     yield ratio(
         "memory that 1e6 bounces take and 1e5 do not", float(held[1] - held[0]), 0.0,

@@ -49,8 +49,8 @@ def reference(count: int, threads: int, rtol: float = RTOL) -> float:
     case, given = cases.load("bouncing_ball", "listing"), draw(count)
     system = engines.load("reference").prepare(case, "compiled").system  # type: ignore[attr-defined]
     found = ensemble(
-        system, given.heights[:, None], np.zeros((count, 1)), case.t_end, law={"a1": given.a1}, threads=threads,
-        rtol=rtol,
+        system, given.heights[:, None], np.zeros((count, 1)), case.t_end, law={"a1": given.a1},
+        threads=threads, rtol=rtol,
     )  # fmt: skip
     assert all(outcome is Outcome.FINISHED for outcome in found.outcome)
     return count / found.wall_s
@@ -123,7 +123,8 @@ def against_mujoco(repeats: int, integrator: str) -> Row:
     a, b = (statistics.median(side) for side in zip(*pairs, strict=True))
     return ratio(
         f"runs of `listing` at {RTOL:g} over MuJoCo's batch, {integrator} at {1e3 * STEP:g} ms, {cores} threads",
-        statistics.median(a / b for a, b in pairs), LEAST_RATIO, f"reference: {a:.4g} runs/s, MuJoCo: {b:.4g} runs/s",
+        statistics.median(a / b for a, b in pairs), LEAST_RATIO,
+        f"reference: {a:.4g} runs/s, MuJoCo: {b:.4g} runs/s",
         "compiled, in threads without the interpreter", least=True,
     )  # fmt: skip
 

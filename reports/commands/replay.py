@@ -94,8 +94,8 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
             watch.limited(text, limit)
 
         found = hw.replay(
-            log, ask.model, kind=kind, wanted=engines, parameters=choice.parse_settings(ask.pairs), restart=ask.restart,
-            horizon=ask.horizon, delay=ask.delay, tell=tell, keep=kept.keeper(parts),
+            log, ask.model, kind=kind, wanted=engines, parameters=choice.parse_settings(ask.pairs),
+            restart=ask.restart, horizon=ask.horizon, delay=ask.delay, tell=tell, keep=kept.keeper(parts),
         )  # fmt: skip
         watch.unlimited()
         limits.check(given, found)
@@ -114,14 +114,14 @@ def _identity(ask: Ask, log: Log, kind: str, wanted: Sequence[str]) -> dict[str,
     """What decides what a replay predicts: the numbers of the log, the model and its source, engines and windows."""
     return identity(
         f"replay {kind}", (), (), log=asdict(log.provenance), model=ask.model,
-        source=kept.source(hw.models.load(ask.model)), pairs=ask.pairs, windows=(ask.restart, ask.horizon, ask.delay),
-        wanted=wanted,
+        source=kept.source(hw.models.load(ask.model)), pairs=ask.pairs,
+        windows=(ask.restart, ask.horizon, ask.delay), wanted=wanted,
     )  # fmt: skip
 
 
 def run_identify(
-    ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, budget: float, out: Path, command: str,
-    limit: float = watch.LIMIT,
+    ask: Ask, free: Sequence[str], hold: int, starts: str, stride: int, budget: float,
+    out: Path, command: str, limit: float = watch.LIMIT,
 ) -> int:  # fmt: skip
     """Identify parameters, replay the log with them, and write the report.
 
@@ -149,12 +149,12 @@ def run_identify(
     watch.resumable("Nothing was replaced; the same command begins anew.")
     watch.limited(label, GRACE * (1.0 + limit))
     fit = hw.identify(
-        log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon, starts=starts, hold=hold,
-        stride=stride, delay=ask.delay, budget=budget, time_limit=limit,
+        log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon,
+        starts=starts, hold=hold, stride=stride, delay=ask.delay, budget=budget, time_limit=limit,
     )  # fmt: skip
     found = hw.replay(
-        log, model, wanted=(model.engine,), parameters=fit.parameters, restart=ask.restart, horizon=ask.horizon,
-        delay=ask.delay + fit.delay,
+        log, model, wanted=(model.engine,), parameters=fit.parameters, restart=ask.restart,
+        horizon=ask.horizon, delay=ask.delay + fit.delay,
     )  # fmt: skip
     watch.unlimited()
     tables = {"identify": estimates(fit), "held_out": held_out(fit)}
@@ -254,8 +254,8 @@ def _write(
     with output.folder(out, name) as made:
         study.write(made, [], records(rows), told)
         tables = {
-            "replay": _metrics(found, rows), "findings": replay.findings(found), "residuals": replay.residuals(found),
-            "correlations": replay.correlations(found), **more,
+            "replay": _metrics(found, rows), "findings": replay.findings(found),
+            "residuals": replay.residuals(found), "correlations": replay.correlations(found), **more,
         }  # fmt: skip
         for stem, shown in tables.items():
             study.write_table(made / stem, shown, told)

@@ -28,9 +28,10 @@ from crossbody.reports.voice import progress
 
 
 def run(
-    cases: Sequence[Case], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str], out: Path,
-    rtol: float | None, settings: Sequence[str], command: str, against: Path | None = None, others: Sequence[Path] = (),
-    limit: float = LIMIT, strict: bool = False, at_once: int = 1, budget: float = BUDGET,
+    cases: Sequence[Case], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str],
+    out: Path, rtol: float | None, settings: Sequence[str], command: str,
+    against: Path | None = None, others: Sequence[Path] = (), limit: float = LIMIT,
+    strict: bool = False, at_once: int = 1, budget: float = BUDGET,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 

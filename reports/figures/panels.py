@@ -26,8 +26,8 @@ class Panels:
     """
 
     def __init__(
-        self, title: str, height: int, *, rows: int = 1, cols: int = 1, gap: float = 0.06, heads: Sequence[str] = (),
-        shared: bool = True,
+        self, title: str, height: int, *, rows: int = 1, cols: int = 1, gap: float = 0.06,
+        heads: Sequence[str] = (), shared: bool = True,
     ) -> None:  # fmt: skip
         self.rows, self.cols, self.data = rows, cols, list[dict[str, Any]]()
         self.layout: dict[str, Any] = {"title": {"text": title}, "height": height, "annotations": []}

@@ -178,8 +178,9 @@ def with_closed_forms(scene: Scene, own: Mapping[str, Inertia | None]) -> Scene:
 
 
 def of_scene(
-    path: Path, scene: Scene, keys: Mapping[str, Floats] = MappingProxyType({}), findings: tuple[str, ...] = (),
-    touching: Sequence[str] | None = None, job: dict[str, Any] | None = None,
+    path: Path, scene: Scene, keys: Mapping[str, Floats] = MappingProxyType({}),
+    findings: tuple[str, ...] = (), touching: Sequence[str] | None = None,
+    job: dict[str, Any] | None = None,
 ) -> Audit:  # fmt: skip
     """Return the audit of a file of which a scene says what it means; without `touching` shapes are not compared."""
     own = job_of(scene, keys)

@@ -15,9 +15,9 @@ from crossbody.reports.importers.gap import Gap, reach
 TOLERANCE = 1e-9  # of the largest entry: the same physics
 OK, WRONG, UNSUPPORTED, FAILED, NONE, UNSEEN = "ok", "wrong", "unsupported", "failed", "-", "not shown"
 QUANTITIES = (
-    "reading", "coordinates", "bodies", "inertia", "M", "gravity", "bias", "energy", "frames", "armature", "damping",
-    "springs", "limits", "friction", "effort", "tendons", "loops", "actuators", "shapes", "contacts", "surfaces",
-    "softness", "keyframes",
+    "reading", "coordinates", "bodies", "inertia", "M", "gravity", "bias", "energy", "frames",
+    "armature", "damping", "springs", "limits", "friction", "effort", "tendons", "loops",
+    "actuators", "shapes", "contacts", "surfaces", "softness", "keyframes",
 )  # fmt: skip
 """Of rows, in their order."""
 SAID = re.compile(r"unsupported|not (yet )?(been )?(supported|implemented)|(will be |is |are )?ignored|ignoring", re.I)
@@ -25,12 +25,13 @@ SAID = re.compile(r"unsupported|not (yet )?(been )?(supported|implemented)|(will
 GENERAL = re.compile(r"the tag '\w+' found as a child of '\w+'", re.I)
 """How one says that it leaves all of a tag out, once; the line of the file is that of the first."""
 WORDS = {
-    "armature": "armature|rotor", "damping": "damping", "springs": "stiffness|spring", "limits": "range|limit",
-    "friction": "friction(loss)?", "effort": "actuatorfrcrange|effort", "keyframes": "keyframe",
-    "surfaces": "friction|condim|margin", "softness": "solref|solimp|solreflimit|solimplimit|timestep",
-    "loops": "equality|connect|weld|mimic|constraint",
-    "actuators": "actuator|motor|transmission", "coordinates": "joint", "tendons": "tendon|spatial",
-    "shapes": "mesh|shape|collision", "contacts": "exclude|contype|conaffinity|pair",
+    "armature": "armature|rotor", "damping": "damping", "springs": "stiffness|spring",
+    "limits": "range|limit", "friction": "friction(loss)?", "effort": "actuatorfrcrange|effort",
+    "keyframes": "keyframe", "surfaces": "friction|condim|margin",
+    "softness": "solref|solimp|solreflimit|solimplimit|timestep",
+    "loops": "equality|connect|weld|mimic|constraint", "actuators": "actuator|motor|transmission",
+    "coordinates": "joint", "tendons": "tendon|spatial", "shapes": "mesh|shape|collision",
+    "contacts": "exclude|contype|conaffinity|pair",
 }  # fmt: skip
 """Quantity -> what such a sentence speaks of."""
 
@@ -145,8 +146,8 @@ class Said:
 
 
 def _row(
-    engine: str, found: Mapping[str, Any], quantity: str, own: Iterable[Gap] | None, tolerance: float, said: Said,
-    bodies: Mapping[str, Set[str]],
+    engine: str, found: Mapping[str, Any], quantity: str, own: Iterable[Gap] | None,
+    tolerance: float, said: Said, bodies: Mapping[str, Set[str]],
 ) -> Row:  # fmt: skip
     """Return one row; what the importer hides, or says of each that it leaves it out, is not wrong."""
     common: dict[str, Any] = {"engine": engine, "version": found["version"], "quantity": quantity}

@@ -78,8 +78,8 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
         for at, here, (q, _) in zip(_dynamics(scene, states, frames), frames, states, strict=True)
     ]  # fmt: skip
     return {
-        "status": "read", "version": "", "hidden": {}, "missing": [], "extra": [], "told": [], "precision": 0.0,
-        "unseen": {} if touching is not None else {"shapes": "", "contacts": ""},
+        "status": "read", "version": "", "hidden": {}, "missing": [], "extra": [], "told": [],
+        "precision": 0.0, "unseen": {} if touching is not None else {"shapes": "", "contacts": ""},
         "numbers": _numbers(scene),
         "actuators": {part.name: _moved(part.joint, part.tendon, scene) for part in scene.actuators},
         "loops": [[loop.type, [] if loop.in_space else [one for one in (loop.first, loop.second) if one],
@@ -215,8 +215,8 @@ def _dynamics(scene: Scene, states: Sequence[tuple[Floats, Floats]], frames: Seq
     plain: dict[str, Any] = {"armature": 0.0, "damping": 0.0, "activation": "", "time_constant": 0.0} | dict.fromkeys(
         ("control_range", "force_range", "activation_range"), UNBOUNDED)  # fmt: skip
     bare = scene.replace(
-        joints=tuple(replace(joint, **nothing) for joint in scene.joints), loops=(), pairs=(), shapes=(), pushes=(),
-        tendons=tuple(replace(part, **slack) for part in scene.tendons),
+        joints=tuple(replace(joint, **nothing) for joint in scene.joints), loops=(), pairs=(),
+        shapes=(), pushes=(), tendons=tuple(replace(part, **slack) for part in scene.tendons),
         actuators=tuple(replace(part, **plain) for part in scene.actuators),
     )  # fmt: skip
     heavy, light, n = tabulate(bare), tabulate(_light(bare)), scene.nv

@@ -229,7 +229,8 @@ def _say_joint(joint: Node, model: Any, i: int) -> None:
         return
     words: dict[str, Callable[[], Any]] = {
         "axis": lambda: model.jnt_axis[i], "range": lambda: model.jnt_range[i],
-        "ref": lambda: model.qpos0[model.jnt_qposadr[i]], "springref": lambda: model.qpos_spring[model.jnt_qposadr[i]],
+        "ref": lambda: model.qpos0[model.jnt_qposadr[i]],
+        "springref": lambda: model.qpos_spring[model.jnt_qposadr[i]],
     }  # fmt: skip
     for key, value in words.items():
         if key == "axis" or (key in joint.attrib and (kind > 1 or key == "range")):

@@ -13,15 +13,15 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files.reading import read
 
 KEPT = (
-    "geom_type", "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_friction", "geom_solref",
-    "geom_solimp", "geom_solmix", "geom_margin", "geom_gap", "geom_fluid", "geom_group", "site_type", "site_size",
-    "pair_friction", "pair_solref", "pair_solimp", "pair_margin", "pair_gap", "pair_dim", "exclude_signature",
-    "jnt_solref", "jnt_solimp", "jnt_actfrcrange", "jnt_actgravcomp", "body_gravcomp",
-    "jnt_margin", "dof_solref", "dof_solimp", "dof_frictionloss", "eq_type", "eq_solref",
-    "eq_solimp", "tendon_range", "tendon_stiffness", "tendon_damping", "tendon_frictionloss", "tendon_armature",
-    "actuator_gear", "actuator_gainprm", "actuator_biasprm", "actuator_dynprm", "actuator_ctrlrange",
-    "actuator_forcerange", "actuator_gaintype", "actuator_biastype", "actuator_dyntype", "key_qpos", "key_qvel",
-    "key_ctrl",
+    "geom_type", "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_friction",
+    "geom_solref", "geom_solimp", "geom_solmix", "geom_margin", "geom_gap", "geom_fluid",
+    "geom_group", "site_type", "site_size", "pair_friction", "pair_solref", "pair_solimp",
+    "pair_margin", "pair_gap", "pair_dim", "exclude_signature", "jnt_solref", "jnt_solimp",
+    "jnt_actfrcrange", "jnt_actgravcomp", "body_gravcomp", "jnt_margin", "dof_solref", "dof_solimp",
+    "dof_frictionloss", "eq_type", "eq_solref", "eq_solimp", "tendon_range", "tendon_stiffness",
+    "tendon_damping", "tendon_frictionloss", "tendon_armature", "actuator_gear", "actuator_gainprm",
+    "actuator_biasprm", "actuator_dynprm", "actuator_ctrlrange", "actuator_forcerange",
+    "actuator_gaintype", "actuator_biastype", "actuator_dyntype", "key_qpos", "key_qvel", "key_ctrl",
 )  # fmt: skip
 """Of the compiled model: what the rewriting must not touch."""
 STATES, LIKE = 3, 1e-7

@@ -215,9 +215,9 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
     for claim in case.claims:
         if claim.metric not in seen:
             yield Verdict(
-                case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=claim.metric, value=math.nan,
-                expected=claim.expected, unit="", tier=claim.tier.value, verdict=Word.OUTSIDE, command=command,
-                why=f"The claim judged no run: {claim.source}.",
+                case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=claim.metric,
+                value=math.nan, expected=claim.expected, unit="", tier=claim.tier.value,
+                verdict=Word.OUTSIDE, command=command, why=f"The claim judged no run: {claim.source}.",
             )  # fmt: skip
 
 
@@ -241,9 +241,10 @@ class _Judge:
 
     def row(self, metric: str, value: float, unit: str, verdict: Word, why: str, **more: Any) -> Verdict:
         return Verdict(
-            case=self.case.name, variant=self.case.variant, engine=self.entry.engine, profile=self.entry.profile,
-            metric=metric, value=value, unit=unit, verdict=verdict, why=why, command=self.command,
-            settings=words(self.entry.settings), **({"tier": self.truth.tier.value} | more),
+            case=self.case.name, variant=self.case.variant, engine=self.entry.engine,
+            profile=self.entry.profile, metric=metric, value=value, unit=unit, verdict=verdict,
+            why=why, command=self.command, settings=words(self.entry.settings),
+            **({"tier": self.truth.tier.value} | more),
         )  # fmt: skip
 
     def judged(self, metric: str, value: float, unit: str, against: Truth, compared: float) -> Verdict:

@@ -25,8 +25,8 @@ def gap_map(rows: pd.DataFrame) -> Figure:
     drawn = rows[rows["s"].notna()]
     counts = list(dict.fromkeys(drawn["n"])) or [0]
     panels = Panels(
-        "Gap map: energy created, and distance from the ideal pattern", 760, rows=len(ROWS), cols=len(counts), gap=0.08,
-        heads=[f"{n} balls" for n in counts],
+        "Gap map: energy created, and distance from the ideal pattern", 760, rows=len(ROWS),
+        cols=len(counts), gap=0.08, heads=[f"{n} balls" for n in counts],
     )  # fmt: skip
     styles: dict[str, int] = {}
     for (n, engine, profile, machine), group in drawn.groupby(["n", "engine", "profile", "machine"], sort=False):
@@ -50,9 +50,9 @@ def _traces(group: pd.DataFrame, column: str, name: str, style: int, legend: boo
     failed = group[group["outcome"] != "finished"]
     if len(failed):
         found.append(usual | {
-            "x": failed["s"].astype(float), "y": [0.0] * len(failed), "name": f"{name}: failed", "mode": "markers",
-            "marker": {"symbol": "x", "size": 8, "color": line["color"]}, "text": failed["why"].astype(str),
-            "hoverinfo": "text",
+            "x": failed["s"].astype(float), "y": [0.0] * len(failed), "name": f"{name}: failed",
+            "mode": "markers", "marker": {"symbol": "x", "size": 8, "color": line["color"]},
+            "text": failed["why"].astype(str), "hoverinfo": "text",
         })  # fmt: skip
     return found
 
@@ -117,8 +117,9 @@ def _field(group: pd.DataFrame, scale: bool) -> dict[str, Any]:
     known = group[group["worst_error"].notna()]
     colours = np.log10(known["worst_error"].astype(float).clip(10.0**BEST, 10.0**WORST))
     marker = {
-        "symbol": "square", "size": 15, "color": colours, "cmin": BEST, "cmax": WORST, "colorscale": "Viridis",
-        "reversescale": True, "showscale": scale, "colorbar": {"title": {"text": "log10 error"}},
+        "symbol": "square", "size": 15, "color": colours, "cmin": BEST, "cmax": WORST,
+        "colorscale": "Viridis", "reversescale": True, "showscale": scale,
+        "colorbar": {"title": {"text": "log10 error"}},
     }  # fmt: skip
     return _places(known) | {"marker": marker}
 

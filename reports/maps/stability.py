@@ -21,8 +21,8 @@ from crossbody.cases.mechanisms.maze.metrics import ring_changes
 from crossbody.reports.runs.choice import Pick
 
 COLUMNS = (
-    "engine", "profile", "change", "scene", "expected", "arrived", "outcome", "ended", "arrival", "changes", "wall_ms",
-    "why",
+    "engine", "profile", "change", "scene", "expected", "arrived", "outcome", "ended",
+    "arrival", "changes", "wall_ms", "why",
 )  # fmt: skip
 HORIZON = 130.0  # time in which the slowest maze of the map comes to the centre, s
 RTOL = 1e-8

@@ -105,8 +105,8 @@ def before(run: Trajectory, t: float) -> Trajectory:
     )
     return replace(
         run, **{name: getattr(run, name)[kept] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")},
-        events=tuple(e for e in run.events if not e.t > t), switches=tuple(s for s in run.switches if not s.t > t),
-        ledger=booked,
+        events=tuple(e for e in run.events if not e.t > t),
+        switches=tuple(s for s in run.switches if not s.t > t), ledger=booked,
     )  # fmt: skip
 
 

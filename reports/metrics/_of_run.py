@@ -9,8 +9,8 @@ from crossbody.cases.contacts import at, rates
 from crossbody.cases.contacts import contacts as contacts_of
 
 UNITS = {
-    "collision_impulse": "N s", "contact_loss": "J", "contact_time": "s", "energy_per_bounce": "J", "fifth_exit": "s",
-    "final_gap": "m", "final_lam": "N", "separation_gap": "m",
+    "collision_impulse": "N s", "contact_loss": "J", "contact_time": "s", "energy_per_bounce": "J",
+    "fifth_exit": "s", "final_gap": "m", "final_lam": "N", "separation_gap": "m",
 }  # fmt: skip
 """Of those that are no counts and no ratios."""
 KINDS: dict[str, str] = {}

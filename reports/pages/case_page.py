@@ -57,8 +57,8 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
             *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
-            *precision(found.out, case.label, rows, _walls(found, case)),
-            *studied(found.out, case.about), _runs(traces, case.about), _audit(found, case), provenance(found.told),
+            *precision(found.out, case.label, rows, _walls(found, case)), *studied(found.out, case.about),
+            _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
 
@@ -82,8 +82,8 @@ def _glance(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="glance", title="At a glance", template="matrix.html",
         context={
-            "corner": "Metric", "heads": grid.heads(grid.names(rows)), "wide": True, "filtered": False, "pages": (),
-            "lines": grid.of_case(rows, case.page, case.label, _walls(found, case)),
+            "corner": "Metric", "heads": grid.heads(grid.names(rows)), "wide": True, "filtered": False,
+            "pages": (), "lines": grid.of_case(rows, case.page, case.label, _walls(found, case)),
             "says": "A cell leads to its limit, its reason and the command that repeats it.",
         },
     )  # fmt: skip

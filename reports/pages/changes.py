@@ -12,13 +12,14 @@ from crossbody.reports.judging.verdict import Row
 KEY = ("case", "variant", "engine", "profile", "metric")
 MOVED = 0.1  # share of its limit by which a value must move to be listed
 WORDS = columns(
-    label="Case", who="Engine", metric="Metric", verdict_before=("Before", Kind.VERDICT), verdict=("Now", Kind.VERDICT),
-    value_before=("Value before", Kind.NUMBER), value=("Value now", Kind.NUMBER), limit=("Limit", Kind.NUMBER),
-    unit="Unit",
+    label="Case", who="Engine", metric="Metric", verdict_before=("Before", Kind.VERDICT),
+    verdict=("Now", Kind.VERDICT), value_before=("Value before", Kind.NUMBER),
+    value=("Value now", Kind.NUMBER), limit=("Limit", Kind.NUMBER), unit="Unit",
 )  # fmt: skip
 VALUES = columns(
-    label="Case", who="Engine", metric="Metric", value_before=("Before", Kind.NUMBER), value=("Now", Kind.NUMBER),
-    limit=("Limit", Kind.NUMBER), unit="Unit", moved=("Moved by, of the limit", Kind.NUMBER),
+    label="Case", who="Engine", metric="Metric", value_before=("Before", Kind.NUMBER),
+    value=("Now", Kind.NUMBER), limit=("Limit", Kind.NUMBER), unit="Unit",
+    moved=("Moved by, of the limit", Kind.NUMBER),
 )  # fmt: skip
 
 

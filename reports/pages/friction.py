@@ -93,15 +93,16 @@ def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dic
     at = np.unique(np.r_[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1])
     at, look = at[(at >= 0) & (at < len(x))], style(trace, i)
     return {
-        "type": "scatter", "mode": "lines+markers", "marker": {"size": 4}, "x": coded(x[at].astype(np.float32)),
-        "y": coded(y[at].astype(np.float32)), "name": plain(label(trace)), "meta": label(trace),
+        "type": "scatter", "mode": "lines+markers", "marker": {"size": 4},
+        "x": coded(x[at].astype(np.float32)), "y": coded(y[at].astype(np.float32)),
+        "name": plain(label(trace)), "meta": label(trace),
         "line": {key: look[key] for key in ("color", "dash", "width")},
     }  # fmt: skip
 
 
 def _plot(
-    name: str, title: str, lines: list[dict[str, Any]], axes: tuple[str, str], shapes: list[dict[str, Any]], *,
-    square: bool = False,
+    name: str, title: str, lines: list[dict[str, Any]], axes: tuple[str, str],
+    shapes: list[dict[str, Any]], *, square: bool = False,
 ) -> Plot:  # fmt: skip
     x, y = axes
     layout = {

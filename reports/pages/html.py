@@ -25,8 +25,8 @@ TEMPLATES = Path(__file__).parent / "templates"
 PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
 PARTS = ("page.js", "plots.js", "solids.js", "player.js")  # the pages' own script, in this order
 SIGNS = {
-    "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·", "ledger only": "∑", "skipped": "-",
-    "crashed": "!",
+    "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·",
+    "ledger only": "∑", "skipped": "-", "crashed": "!",
 }  # fmt: skip
 """A verdict is told by sign and word besides its colour."""
 MOST = 2000  # rows of a table that a page shows; the file beside it has all
@@ -104,7 +104,8 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
     return template.render(
         pages=pages, links=links, footer=footer, href=href,
         drawn=any(section.plots for page in pages for section in page.sections),
-        inline={key: Markup(text) for key, text in inline.items()}, theme=Markup(THEME), policy=policy(scripts, single),
+        inline={key: Markup(text) for key, text in inline.items()}, theme=Markup(THEME),
+        policy=policy(scripts, single),
     )  # fmt: skip
 
 

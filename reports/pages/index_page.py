@@ -35,7 +35,8 @@ def index_pages(found: Results) -> list[Page]:
     names = ["index", *(f"index-{i}" for i in range(2, len(cut) + 1))]
     return [
         Page(
-            name=name, title="crossbody" if i == 0 else f"crossbody, cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
+            name=name,
+            title="crossbody" if i == 0 else f"crossbody, cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
             lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
@@ -57,8 +58,9 @@ def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i:
     return Section(
         name="matrix", title="Cases", template="matrix.html",
         context={
-            "corner": "Case", "heads": grid.heads(shown), "lines": [_line(found, case, shown) for case in cases],
-            "pages": names, "here": i, "cases": len(found.cases), "wide": False, "filtered": len(cases) > 5,
+            "corner": "Case", "heads": grid.heads(shown),
+            "lines": [_line(found, case, shown) for case in cases], "pages": names, "here": i,
+            "cases": len(found.cases), "wide": False, "filtered": len(cases) > 5,
             "says": "Each cell shows how many of its judged rows have its worst verdict, and below, the relative error "
             "of position and the run time.",
         },

@@ -102,8 +102,9 @@ def _track(
     poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)[:, pushing]
     look = style(trace, i)
     return {
-        "name": label(trace), "color": look["color"], "strokes": look["strokes"], "truth": label(trace) == TRUTH,
-        "t": _single(t[at]), "poses": _single(poses), "arrows": _single(arrows),
+        "name": label(trace), "color": look["color"], "strokes": look["strokes"],
+        "truth": label(trace) == TRUTH, "t": _single(t[at]), "poses": _single(poses),
+        "arrows": _single(arrows),
     } | _blows(run, scene, parameters, pushing)  # fmt: skip
 
 

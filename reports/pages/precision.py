@@ -75,8 +75,9 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
     """
     data = [
         {
-            "type": "scatter", "mode": "markers", "x": [error for _, error, _ in mine], "y": [ms for *_, ms in mine],
-            "name": plain(who), "meta": who, "text": [plain(label) for label, *_ in mine],
+            "type": "scatter", "mode": "markers", "x": [error for _, error, _ in mine],
+            "y": [ms for *_, ms in mine], "name": plain(who), "meta": who,
+            "text": [plain(label) for label, *_ in mine],
             "hovertemplate": "%{text}<br>error %{x:.2g}, %{y:.3g} ms<extra>" + plain(who) + "</extra>",
             "marker": {"size": 9, "color": COLOURS[i % len(COLOURS)], "symbol": SYMBOLS[i % len(SYMBOLS)],
                        "opacity": 0.8},
@@ -114,9 +115,10 @@ def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
     edge = 10.0 * max([*finite, FLOOR])
     data = [
         {
-            "type": "scatter", "mode": "markers+text", "x": [max(error, FLOOR) if math.isfinite(error) else edge],
-            "y": [ms], "name": plain(who), "meta": who, "text": [plain(who)], "textposition": _side(error, edge),
-            "textfont": {"size": 11}, "cliponaxis": False,
+            "type": "scatter", "mode": "markers+text",
+            "x": [max(error, FLOOR) if math.isfinite(error) else edge], "y": [ms],
+            "name": plain(who), "meta": who, "text": [plain(who)],
+            "textposition": _side(error, edge), "textfont": {"size": 11}, "cliponaxis": False,
             "marker": {"size": 10, "color": COLOURS[i % len(COLOURS)],
                        "symbol": SYMBOLS[i % len(SYMBOLS)] if math.isfinite(error) else "x"},
         }

@@ -59,9 +59,8 @@ def _bar(trace: Trace, name: str, mode: Mode, spans: Sequence[tuple[float, float
     starts, widths = np.array(spans).T
     return {
         "type": "bar", "y": [plain(name)] * len(starts), "base": starts.tolist(), "x": widths.tolist(),
-        "orientation": "h",
-        "marker": {"color": MODE_COLOURS[mode], "line": {"width": 0}}, "name": mode.name, "legendgroup": mode.name,
-        "meta": label(trace),
+        "orientation": "h", "marker": {"color": MODE_COLOURS[mode], "line": {"width": 0}},
+        "name": mode.name, "legendgroup": mode.name, "meta": label(trace),
         "hovertemplate": f"{mode.name} from %{{base:.9g}} s for %{{x:.6g}} s<extra></extra>",
     }  # fmt: skip
 

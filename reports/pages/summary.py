@@ -30,8 +30,8 @@ BENCH = (
 COLUMNS = columns(
     who="Engine", worst=("Worst", Kind.VERDICT), within=("Cases trusted", Kind.NUMBER),
     expected=("with known deviations", Kind.NUMBER), outside=("outside", Kind.NUMBER),
-    skipped=("not run", Kind.NUMBER), error=("Error, median", Kind.NUMBER), most=("Error, worst", Kind.NUMBER),
-    cost=("Run time over the reference's, median", Kind.NUMBER),
+    skipped=("not run", Kind.NUMBER), error=("Error, median", Kind.NUMBER),
+    most=("Error, worst", Kind.NUMBER), cost=("Run time over the reference's, median", Kind.NUMBER),
     ratio=("At its best error", Kind.NUMBER),
 )  # fmt: skip
 

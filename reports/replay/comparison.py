@@ -45,24 +45,24 @@ def verdicts(found: Comparison, command: str, given: Sequence[Limit] = (), fit: 
 
     def row(engine: str, profile: str, **more: Any) -> Verdict:
         return Verdict(
-            case=found.model, variant=variant(found.log), engine=engine, profile=profile, tier=tier(found.log),
-            command=command, **more,
+            case=found.model, variant=variant(found.log), engine=engine, profile=profile,
+            tier=tier(found.log), command=command, **more,
         )  # fmt: skip
 
     rows = []
     for r in found.rows():
         word, why, best, allowed = limits.judged(r, rules)
         rows.append(row(
-            r.engine, r.profile, metric=limits.label(r), value=r.value, unit=r.unit, verdict=word, expected=best,
-            limit=allowed, why=why or source,
+            r.engine, r.profile, metric=limits.label(r), value=r.value, unit=r.unit,
+            verdict=word, expected=best, limit=allowed, why=why or source,
         ))  # fmt: skip
     if fit is not None and not np.isnan(fit.worse):
         rule = limit_for((limits.WORSE, *rules), limits.HELD, "*", "*")
         word, why, best, allowed = limits.against(fit.worse, rule)
         for p in found.predictions[:1]:
             rows.append(row(
-                p.engine, p.profile, metric=limits.HELD, value=fit.worse, unit="%", verdict=word, expected=best,
-                limit=allowed, why=why,
+                p.engine, p.profile, metric=limits.HELD, value=fit.worse, unit="%",
+                verdict=word, expected=best, limit=allowed, why=why,
             ))  # fmt: skip
     rows += [
         row(engine, profile, metric="-", value=np.nan, unit="", verdict=Word.SKIPPED, why=why)
@@ -102,7 +102,8 @@ def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[st
         for name, test in tests.items():
             for lag, value in zip(test.lags.tolist(), test.values.tolist(), strict=True):
                 yield {
-                    "who": who, "channel": c.name, "input": name, "lag": lag, "value": value, "band": test.band,
+                    "who": who, "channel": c.name, "input": name, "lag": lag, "value": value,
+                    "band": test.band,
                 }  # fmt: skip
 
 
@@ -169,5 +170,6 @@ def _about(found: Comparison, engine: str, profile: str) -> dict[str, Any]:
     return {
         "case": found.model, "variant": variant(found.log), "title": found.title, "mechanism": "",
         "engine": engine, "profile": profile, "contacts": [], "parameters": dict(found.parameters),
-        "coordinates": [{"name": c.name, "unit": c.unit} for c in found.coordinates], "units": dict(found.units),
+        "coordinates": [{"name": c.name, "unit": c.unit} for c in found.coordinates],
+        "units": dict(found.units),
     }  # fmt: skip

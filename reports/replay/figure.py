@@ -96,10 +96,10 @@ def together(rows: pd.DataFrame) -> Figure:
     wide = rows.pivot(index="name", columns="other", values="value").loc[names, names].to_numpy(float)
     labels = [plain(name) for name in names]
     heat = {
-        "type": "heatmap", "x": labels, "y": labels, "zmin": -1.0, "zmax": 1.0, "colorscale": SIGNED, "xgap": 1,
-        "ygap": 1, "z": [[None if np.isnan(x) else x for x in row] for row in wide.tolist()],
-        "text": [["" if np.isnan(x) else f"{x:+.2f}" for x in row] for row in wide], "texttemplate": "%{text}",
-        "colorbar": {"title": {"text": "correlation [1]"}},
+        "type": "heatmap", "x": labels, "y": labels, "zmin": -1.0, "zmax": 1.0, "colorscale": SIGNED,
+        "xgap": 1, "ygap": 1, "z": [[None if np.isnan(x) else x for x in row] for row in wide.tolist()],
+        "text": [["" if np.isnan(x) else f"{x:+.2f}" for x in row] for row in wide],
+        "texttemplate": "%{text}", "colorbar": {"title": {"text": "correlation [1]"}},
         "hovertemplate": "%{x} and %{y}: %{z:.4f}<extra></extra>",
     }  # fmt: skip
     return {
@@ -130,8 +130,9 @@ def _line(x: Floats, y: Floats, name: str, place: int, i: int = 0) -> dict[str, 
     look = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.5}
     axis = number(place)
     return {
-        "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)), "name": plain(name),
-        "legendgroup": plain(name), "showlegend": place == 1, "line": look, "xaxis": f"x{axis}", "yaxis": f"y{axis}",
+        "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)),
+        "name": plain(name), "legendgroup": plain(name), "showlegend": place == 1, "line": look,
+        "xaxis": f"x{axis}", "yaxis": f"y{axis}",
     }  # fmt: skip
 
 

@@ -47,7 +47,8 @@ def _write(made: Path, found: Prediction) -> None:
     told = {
         "engine": found.engine, "profile": found.profile, "settings": dict(found.settings),
         "outcomes": [outcome.value for outcome in found.outcomes], "messages": found.messages,
-        "wall_s": found.wall_s, "steps": found.steps, "rows": [len(y) for y in found.y], "width": found.y[0].shape[1],
+        "wall_s": found.wall_s, "steps": found.steps, "rows": [len(y) for y in found.y],
+        "width": found.y[0].shape[1],
     }  # fmt: skip
     (made / ABOUT).write_text(json.dumps(told), encoding="utf-8")
     (made / ARRAYS).write_bytes(np.stack([np.concatenate(found.y), np.concatenate(found.yd)]).tobytes())

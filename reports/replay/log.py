@@ -61,9 +61,9 @@ def plain(found: Survey, told: Sequence[Finding]) -> dict[str, Any]:
     """A survey and what is doubtful about it in plain values, None for what is not finite."""
     groups = [
         {
-            "name": group.group.name, "rows": group.rows, "clock": group.clock.column if group.clock else None,
-            "duration": group.duration, "step": group.step, "longest": group.longest, "lost": group.lost,
-            "jitter": group.jitter,
+            "name": group.group.name, "rows": group.rows,
+            "clock": group.clock.column if group.clock else None, "duration": group.duration,
+            "step": group.step, "longest": group.longest, "lost": group.lost, "jitter": group.jitter,
             "channels": [
                 {"name": one.column.name, "unit": one.column.unit, "type": one.column.type, "smallest": one.low,
                  "largest": one.high, "not_finite": one.missing}

@@ -142,8 +142,8 @@ def of_start(case: Case, why: str) -> Trajectory:
     """A run that got no further than its start, and why."""
     q, v, nothing = case.q0[None], case.v0[None], np.zeros((1, len(case.contacts)))
     return Trajectory(
-        t=np.zeros(1), q=q, v=v, gap=nothing, lam=nothing, energy=np.zeros((1, 2)), mode=nothing.astype(np.int8) - 1,
-        outcome=Outcome.TIME_LIMIT, message=why,
+        t=np.zeros(1), q=q, v=v, gap=nothing, lam=nothing, energy=np.zeros((1, 2)),
+        mode=nothing.astype(np.int8) - 1, outcome=Outcome.TIME_LIMIT, message=why,
     )  # fmt: skip
 
 

@@ -140,7 +140,8 @@ def _opened(path: Path) -> BinaryIO:
 
 
 _TOLD: dict[str, type | tuple[type, ...]] = {
-    "about": dict, "events": list, "outcome": str, "message": str, "steps": int, "wall_s": (int, float), "counts": dict,
+    "about": dict, "events": list, "outcome": str, "message": str, "steps": int,
+    "wall_s": (int, float), "counts": dict,
 }  # fmt: skip
 _ABOUT: dict[str, type | tuple[type, ...]] = {
     "case": str,
@@ -208,11 +209,9 @@ def _loaded(path: Path) -> Trace:
     _check(about, "", _TOLD)
     blocks = _blocks(data)
     run = replace(
-        _motion(blocks),
-        ledger=_ledger(blocks),
-        events=tuple(_event(*given) for given in about["events"]),
-        outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"], wall_s=about["wall_s"],
-        counts=about["counts"], control_s=float(about.get("control_s", 0.0)),
+        _motion(blocks), ledger=_ledger(blocks), events=tuple(_event(*given) for given in about["events"]),
+        outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"],
+        wall_s=about["wall_s"], counts=about["counts"], control_s=float(about.get("control_s", 0.0)),
     )  # fmt: skip
     truth = _motion(blocks, "truth_") if "truth_q" in blocks else None
     return Trace(about=about["about"], run=run, truth=truth)

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 CASE = "case.json"
 AUDIT = {
-    **dict.fromkeys(("case", "engine", "profile", "quantity", "reference", "value"), str), "difference": float,
-    "tolerance": float, "same": bool,
+    **dict.fromkeys(("case", "engine", "profile", "quantity", "reference", "value"), str),
+    "difference": float, "tolerance": float, "same": bool,
 }  # fmt: skip
 _ARROW = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
 
@@ -141,9 +141,9 @@ def _write_both(stem: Path, arrow: pa.Table, plain: Sequence[Row], provenance: M
 def _audit(results: Sequence[CaseResult]) -> list[Row]:
     return [
         {
-            "case": result.case.label, "engine": entry.engine, "profile": entry.profile, "quantity": row.quantity,
-            "reference": row.theirs, "value": row.mine, "difference": row.difference, "tolerance": row.tolerance,
-            "same": bool(row.ok),
+            "case": result.case.label, "engine": entry.engine, "profile": entry.profile,
+            "quantity": row.quantity, "reference": row.theirs, "value": row.mine,
+            "difference": row.difference, "tolerance": row.tolerance, "same": bool(row.ok),
         }
         for result in results for entry in result.entries for row in entry.audit
     ]  # fmt: skip
@@ -194,7 +194,8 @@ def _beside(truth: Truth, run: Trajectory) -> Trajectory | None:
         return whole
 
     return Trajectory(
-        t=run.t, q=put(exact.q), v=put(exact.v), gap=put(exact.gap), lam=put(exact.lam), energy=put(exact.energy),
+        t=run.t, q=put(exact.q), v=put(exact.v), gap=put(exact.gap), lam=put(exact.lam),
+        energy=put(exact.energy),
         mode=np.where(inside[:, None], np.nan_to_num(put(exact.mode.astype(np.float64))), -1).astype(np.int8),
     )  # fmt: skip
 

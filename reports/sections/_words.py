@@ -27,18 +27,19 @@ ANALYSIS_TABLES = (
         observable=("Observable", Kind.NUMBER), growth=("Growth [1/s]", Kind.NUMBER),
     )),
     ("Characteristic polynomials", "coefficients", columns(
-        place="Equilibrium", axis="Axis", **{"s^2": ("s^2 [1/s]", Kind.NUMBER), "s": ("s [1/s^2]", Kind.NUMBER)},
+        place="Equilibrium", axis="Axis",
+        **{"s^2": ("s^2 [1/s]", Kind.NUMBER), "s": ("s [1/s^2]", Kind.NUMBER)},
         **{"1": ("1 [1/s^3]", Kind.NUMBER)}, coupling=("Coupling", Kind.NUMBER),
     )),
     ("Limits of stability", "limits", columns(
-        place="Equilibrium", parameter="Parameter", value=("Limit of stability", Kind.NUMBER), unstable="Unstable",
-        frequency=("Frequency [rad/s]", Kind.NUMBER),
+        place="Equilibrium", parameter="Parameter", value=("Limit of stability", Kind.NUMBER),
+        unstable="Unstable", frequency=("Frequency [rad/s]", Kind.NUMBER),
     )),
     ("Without a linear model", "refusals", columns(place="State", why=("Why", Kind.LONG))),
     ("Linear models of engines", "engines", columns(
-        place="Equilibrium", engine="Engine", way="Way", slope=("Slope", Kind.NUMBER), poles=("Poles", Kind.NUMBER),
-        unexplained=("Unexplained", Kind.NUMBER), limit=("Limit", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
-        why=("Why", Kind.LONG),
+        place="Equilibrium", engine="Engine", way="Way", slope=("Slope", Kind.NUMBER),
+        poles=("Poles", Kind.NUMBER), unexplained=("Unexplained", Kind.NUMBER),
+        limit=("Limit", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT), why=("Why", Kind.LONG),
     )),
 )  # fmt: skip
 BODE_TEXT = (
@@ -60,15 +61,16 @@ ORDERS = columns(
     promised=("Promised order", Kind.NUMBER), says=("Says", Kind.LONG),
 )  # fmt: skip
 TIMINGS = columns(
-    case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER), against="Against the truth of",
-    tier="Tier", error=("Error", Kind.NUMBER), error_q=("Position", Kind.NUMBER),
-    error_v=("Velocity", Kind.NUMBER), error_impulse=("Impulse", Kind.NUMBER),
-    error_energy=("Energy", Kind.NUMBER), error_times=("Event times [s]", Kind.NUMBER),
-    error_between=("Position on one grid", Kind.NUMBER), honesty=("Error over tolerance", Kind.NUMBER),
-    median_ms=("Median [ms]", Kind.NUMBER), iqr_ms=("IQR [ms]", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER),
+    case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER),
+    against="Against the truth of", tier="Tier", error=("Error", Kind.NUMBER),
+    error_q=("Position", Kind.NUMBER), error_v=("Velocity", Kind.NUMBER),
+    error_impulse=("Impulse", Kind.NUMBER), error_energy=("Energy", Kind.NUMBER),
+    error_times=("Event times [s]", Kind.NUMBER), error_between=("Position on one grid", Kind.NUMBER),
+    honesty=("Error over tolerance", Kind.NUMBER), median_ms=("Median [ms]", Kind.NUMBER),
+    iqr_ms=("IQR [ms]", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER),
     native_ms=("Its own loop [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
-    interpreted=("Interpreted", Kind.LONG), cores=("Cores", Kind.NUMBER), repeats=("Repeats", Kind.NUMBER),
-    outcome="Outcome",
+    interpreted=("Interpreted", Kind.LONG), cores=("Cores", Kind.NUMBER),
+    repeats=("Repeats", Kind.NUMBER), outcome="Outcome",
 )  # fmt: skip
 HEADLINE_TEXT = (
     "For each engine, its best error and the run time there, compared with the cheapest run of the compiled reference "
@@ -78,11 +80,12 @@ HEADLINE_TEXT = (
     "makes the same steps natively, without recording, events and the parts of the law that are Python."
 )
 HEADLINE = columns(
-    case="Case", who="Engine", tier="Tier", against="Against the truth of", best_error=("Best error", Kind.NUMBER),
-    engine_ms=("Its run [ms]", Kind.NUMBER), reference_ms=("Reference [ms]", Kind.NUMBER),
-    ratio=("Ratio", Kind.NUMBER), ratio_call=("Ratio of the Python calls", Kind.NUMBER),
-    ratio_native=("Its own loop alone", Kind.NUMBER), least_ratio=("Least ratio", Kind.NUMBER),
-    interpreted=("Interpreted in its run", Kind.LONG), ahead="Ahead at every error", says=("Says", Kind.LONG),
+    case="Case", who="Engine", tier="Tier", against="Against the truth of",
+    best_error=("Best error", Kind.NUMBER), engine_ms=("Its run [ms]", Kind.NUMBER),
+    reference_ms=("Reference [ms]", Kind.NUMBER), ratio=("Ratio", Kind.NUMBER),
+    ratio_call=("Ratio of the Python calls", Kind.NUMBER), ratio_native=("Its own loop alone", Kind.NUMBER),
+    least_ratio=("Least ratio", Kind.NUMBER), interpreted=("Interpreted in its run", Kind.LONG),
+    ahead="Ahead at every error", says=("Says", Kind.LONG),
 )  # fmt: skip
 CONFORMANCE_TEXT = (
     "One file for each feature. Every engine's own reader reads it in a separate process, and the result is compared "
@@ -92,9 +95,10 @@ CONFORMANCE_TEXT = (
     "expose it. wrong: it reads something else without a warning. failed: it gives up."
 )
 DETAILS = columns(
-    feature="Feature", engine="Engine", version="Version", verdict=("Verdict", Kind.VERDICT), quantity="Quantity",
-    where="Where", value=("Value", Kind.NUMBER), expected=("Expected", Kind.NUMBER), why=("It says", Kind.LONG),
-    rule=("Rule of the format", Kind.LONG), rewrite=("How all agree", Kind.LONG), text=("File", Kind.CODE),
+    feature="Feature", engine="Engine", version="Version", verdict=("Verdict", Kind.VERDICT),
+    quantity="Quantity", where="Where", value=("Value", Kind.NUMBER), expected=("Expected", Kind.NUMBER),
+    why=("It says", Kind.LONG), rule=("Rule of the format", Kind.LONG),
+    rewrite=("How all agree", Kind.LONG), text=("File", Kind.CODE),
 )  # fmt: skip
 GAPS_TEXT = (
     "Elastic sliders, hit by one ball; s = gap sqrt(a0) / v is the gap relative to the deepest penetration of one "
@@ -112,8 +116,9 @@ STABILITY_TEXT = (
     "sampling and noise. If the ball tumbles through several rings, either outcome is possible."
 )
 STABILITY = columns(
-    who="Engine", scene="Scene", expected="Published", outcome="Outcome", arrival=("Arrival [s]", Kind.NUMBER),
-    ended=("End [s]", Kind.NUMBER), changes=("Rings passed", Kind.NUMBER), why=("Says", Kind.LONG),
+    who="Engine", scene="Scene", expected="Published", outcome="Outcome",
+    arrival=("Arrival [s]", Kind.NUMBER), ended=("End [s]", Kind.NUMBER),
+    changes=("Rings passed", Kind.NUMBER), why=("Says", Kind.LONG),
 )  # fmt: skip
 STRESS_TEXT = (
     "Quasi-random and gridded extreme scenes, each bounded in steps and time. A run is outside if it raised an "
@@ -130,9 +135,10 @@ SMALL_TEXT = (
 )
 SUITES = columns(
     suite="Suite", who="Engine", runs=("Runs", Kind.NUMBER), finished=("Finished", Kind.NUMBER),
-    not_run=("Not run", Kind.NUMBER), outside=("Outside", Kind.NUMBER), with_truth=("With truth", Kind.NUMBER),
-    worst_error=("Worst error", Kind.NUMBER), worst_residual=("Worst energy residual", Kind.NUMBER),
-    seconds=("Time [s]", Kind.NUMBER), outcomes="Other ends",
+    not_run=("Not run", Kind.NUMBER), outside=("Outside", Kind.NUMBER),
+    with_truth=("With truth", Kind.NUMBER), worst_error=("Worst error", Kind.NUMBER),
+    worst_residual=("Worst energy residual", Kind.NUMBER), seconds=("Time [s]", Kind.NUMBER),
+    outcomes="Other ends",
 )  # fmt: skip
 CELLS = columns(
     who="Engine", a0=("a0 [1/s²]", Kind.NUMBER), knob="Knob", setting=("Setting", Kind.NUMBER),
@@ -140,6 +146,6 @@ CELLS = columns(
     outcomes="Other ends",
 )  # fmt: skip
 FAILED = columns(
-    verdict=("Verdict", Kind.VERDICT), outcome="Outcome", who="Engine", suite="Suite", count=("Times", Kind.NUMBER),
-    why=("Says", Kind.LONG), command=("Command", Kind.CODE),
+    verdict=("Verdict", Kind.VERDICT), outcome="Outcome", who="Engine", suite="Suite",
+    count=("Times", Kind.NUMBER), why=("Says", Kind.LONG), command=("Command", Kind.CODE),
 )  # fmt: skip

@@ -18,7 +18,8 @@ TEXT = (
 )
 METRICS = columns(
     who="Engine", metric="Metric", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
-    expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
+    expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER),
+    verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 FINDINGS = columns(
     what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)

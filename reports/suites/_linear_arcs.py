@@ -221,8 +221,9 @@ class LinearArcs:
         ]
         return Trajectory(
             t=times, q=q, v=v, gap=q @ self.H.T + self.c, lam=lam, energy=np.stack(energy, axis=1),
-            mode=np.array([arcs[k].modes for k in piece], dtype=np.int8).reshape(lam.shape), events=tuple(events),
-            steps=len(arcs), outcome=outcome, message="" if outcome.ok else outcome.advice,
+            mode=np.array([arcs[k].modes for k in piece], dtype=np.int8).reshape(lam.shape),
+            events=tuple(events), steps=len(arcs), outcome=outcome,
+            message="" if outcome.ok else outcome.advice,
         )  # fmt: skip
 
 

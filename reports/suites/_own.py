@@ -26,9 +26,10 @@ GAPS = Levels((0.0, 1e-3))
 IMPACT = {"gravity": 0.0, "height": 0.0, "a2": 0.0, "t_end": 100.0}
 LAW: dict[str, Axis] = {"a0": Log(1.0, 1e12), "mass": Log(1e-6, 1e6), "speed": Log(1e-6, 1e3)}
 FALL: dict[str, Axis] = {
-    "drop": Log(1e-5, 1e-1), "tilt": Linear(-0.6, 0.6), "spin": Linear(-5.0, 5.0), "speed_x": Linear(-1.0, 1.0),
-    "speed_y": Linear(-2.0, 0.0), "mass": Log(1e-1, 1e1), "slab_tilt": Linear(-0.05, 0.05),
-    "zeta3": Linear(0.0, 2.0), "zeta4": Linear(0.0, 2.0), "zeta5": Linear(0.0, 2.0),
+    "drop": Log(1e-5, 1e-1), "tilt": Linear(-0.6, 0.6), "spin": Linear(-5.0, 5.0),
+    "speed_x": Linear(-1.0, 1.0), "speed_y": Linear(-2.0, 0.0), "mass": Log(1e-1, 1e1),
+    "slab_tilt": Linear(-0.05, 0.05), "zeta3": Linear(0.0, 2.0), "zeta4": Linear(0.0, 2.0),
+    "zeta5": Linear(0.0, 2.0),
 }  # fmt: skip
 CORNERS: dict[str, Axis] = {"zeta3": Linear(0.0, 2.0), "zeta4": Linear(0.0, 2.0)}
 LEVEL = {"tilt": 0.0, "spin": 0.0}
@@ -58,7 +59,8 @@ SUITES: Mapping[str, Suite] = {
         ),
     ),
     "cubic": Suite(
-        about="Floors with a cubic term up to 1e12 1/(m^2 s^2), held against an independent integrator.", runs=120,
+        about="Floors with a cubic term up to 1e12 1/(m^2 s^2), held against an independent integrator.",
+        runs=120,
         families=(
             cubic(scene=scenes.damped, second=5, fixed={"t_end": 2.0},
                   axes={"a0": Log(1.0, 1e8), "zeta": Log(1e-2, 10.0), "a2": Log(1.0, 1e12), "mass": Log(1e-6, 1e6),
@@ -140,7 +142,8 @@ SUITES: Mapping[str, Suite] = {
     ),
     # A light ball between heavy ones collides pi sqrt(ratio) / 2 times: three and more balls stop at a ratio of 1e6.
     "mass_ratio": Suite(
-        about="Rows of balls with mass ratios of up to 1e12, collisions in no time and in real time.", runs=200,
+        about="Rows of balls with mass ratios of up to 1e12, collisions in no time and in real time.",
+        runs=200,
         families=(
             sliders(scene=scenes.uneven, grid={"collisions": RULES, "gap": GAPS}, fixed={"n": 2},
                     axes={"ratio": Log(1.0, 1e12), "speed": Log(1e-6, 1e3)}),
@@ -159,7 +162,8 @@ SUITES: Mapping[str, Suite] = {
         ),
     ),
     "poses": Suite(
-        about="Poses of the delta robot up to the edge of what it reaches, and singular ones on the way.", runs=80,
+        about="Poses of the delta robot up to the edge of what it reaches, and singular ones on the way.",
+        runs=80,
         families=(
             Family(case="delta_free", variant="light", scene=scenes.at_the_edge, fixed={"t_end": 0.3}, second=10,
                    axes={"azimuth": Linear(0.0, 2.0 * math.pi), "elevation": Linear(-1.5, 1.5), "off": Log(1e-9, 1.0)},
@@ -229,7 +233,8 @@ SUITES: Mapping[str, Suite] = {
         ),
     ),
     "tolerance": Suite(
-        about="Tolerances from 1e-3 to 1e-12 and steps from 1e-2 to 1e-5 s on every case with contacts.", runs=70,
+        about="Tolerances from 1e-3 to 1e-12 and steps from 1e-2 to 1e-5 s on every case with contacts.",
+        runs=70,
         families=(
             Family(case="bouncing_ball", variant="linear", ladder=FINE, fixed={"t_end": 1.0},
                    axes={"height": Linear(0.01, 0.5)}, grid={"a0": Levels((1e2, 1e4, 1e6))}),

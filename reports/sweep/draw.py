@@ -130,9 +130,9 @@ def specs(
 def _spec(suite: str, family: Family, place: int, scene: Scene, pick: Pick, index: int) -> Spec:
     reference = (pick.engine, pick.profile) == ("reference", "compiled")
     return Spec(
-        suite=suite, index=index, draw=place * 1_000_000 + scene.draw, case=family.case, variant=family.variant,
-        parameters=scene.parameters, engine=pick.engine, profile=pick.profile, rung=scene.rung, ladder=family.ladder,
-        seed=scene.seed, second=scene.second and reference, afford=reference and not family.ends,
-        limit=family.limit, finishes=family.finishes,
+        suite=suite, index=index, draw=place * 1_000_000 + scene.draw, case=family.case,
+        variant=family.variant, parameters=scene.parameters, engine=pick.engine, profile=pick.profile,
+        rung=scene.rung, ladder=family.ladder, seed=scene.seed, second=scene.second and reference,
+        afford=reference and not family.ends, limit=family.limit, finishes=family.finishes,
         ends=family.ends and reference, max_steps=family.max_steps, time_limit=family.time_limit,
     )  # fmt: skip

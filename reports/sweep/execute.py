@@ -31,10 +31,11 @@ REFUSED, SKIPPED, EXCEPTION, CRASHED = "refused", "skipped", "exception", "crash
 """Ends of a run that never began, or that should not be: the words beside those of `Outcome`."""
 
 COLUMNS = {
-    "index": "int64", "suite": "str", "draw": "int64", "case": "str", "variant": "str", "parameters": "str",
-    "engine": "str", "profile": "str", "settings": "str", "rung": "int64", "seed": "int64", "outcome": "str",
-    "t": "float64", "steps": "int64", "events": "int64", "tier": "str", "error": "float64", "until": "float64",
-    "residual": "float64", "limit": "float64", "verdict": "str", "why": "str", "command": "str",
+    "index": "int64", "suite": "str", "draw": "int64", "case": "str", "variant": "str",
+    "parameters": "str", "engine": "str", "profile": "str", "settings": "str", "rung": "int64",
+    "seed": "int64", "outcome": "str", "t": "float64", "steps": "int64", "events": "int64",
+    "tier": "str", "error": "float64", "until": "float64", "residual": "float64",
+    "limit": "float64", "verdict": "str", "why": "str", "command": "str",
 }  # fmt: skip
 TIMES = ("index", "wall_ms")
 
@@ -181,13 +182,14 @@ def row(spec: Spec, tried: Tried, error: Error, heard: list[str]) -> dict[str, A
         faults.append(tried.message)
     verdict, why = _verdict(spec, tried, error, most, open_, faults)
     return {
-        "index": spec.index, "suite": spec.suite, "draw": spec.draw, "case": spec.case, "variant": spec.variant,
-        "parameters": json.dumps(dict(spec.parameters)), "engine": spec.engine, "profile": spec.profile,
-        "settings": json.dumps(settings), "rung": spec.rung, "seed": spec.seed, "outcome": tried.outcome,
-        "t": float(run.t[-1]) if run is not None and len(run.t) else math.nan,
-        "steps": run.steps if run is not None else 0, "events": len(run.events) if run is not None else 0,
-        "tier": error.tier, "error": error.value, "until": error.until, "residual": open_, "limit": most,
-        "verdict": verdict.value, "why": why, "command": spec.command(settings), "wall_ms": 1e3 * tried.wall_s,
+        "index": spec.index, "suite": spec.suite, "draw": spec.draw, "case": spec.case,
+        "variant": spec.variant, "parameters": json.dumps(dict(spec.parameters)), "engine": spec.engine,
+        "profile": spec.profile, "settings": json.dumps(settings), "rung": spec.rung, "seed": spec.seed,
+        "outcome": tried.outcome, "t": float(run.t[-1]) if run is not None and len(run.t) else math.nan,
+        "steps": run.steps if run is not None else 0,
+        "events": len(run.events) if run is not None else 0, "tier": error.tier, "error": error.value,
+        "until": error.until, "residual": open_, "limit": most, "verdict": verdict.value, "why": why,
+        "command": spec.command(settings), "wall_ms": 1e3 * tried.wall_s,
     }  # fmt: skip
 
 

@@ -65,7 +65,8 @@ def _ensemble(group: Sequence[Ready]) -> list[dict[str, Any]]:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         done = ensemble(
-            system, np.stack([c.q0 for _, c, _ in group]), np.stack([c.v0 for _, c, _ in group]), case.t_end, threads=1,
+            system, np.stack([c.q0 for _, c, _ in group]),
+            np.stack([c.v0 for _, c, _ in group]), case.t_end, threads=1,
             parameters={name: np.array([s.p[i] for _, _, s in group]) for i, name in enumerate(names)},
             law={name: np.stack([getattr(c.law, name) for _, c, _ in group]) for name in CONSTANTS},
             rtol=rtol, fsm=case.fsm, collisions=case.collisions, max_steps=spec.max_steps,

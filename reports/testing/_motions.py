@@ -148,8 +148,8 @@ def _signals(run: Trajectory, truth: Truth, of: Sequence[str], rtol: float, atol
         largest = np.max(np.abs(getattr(truth.trajectory, name)), axis=0, initial=0.0)
         for i in range(wanted.shape[1]):
             yield Signal(
-                name=f"{name}[{i}]", t=run.t[inside], found=getattr(run, name)[inside, i], wanted=wanted[:, i],
-                allowed=atol + rtol * float(np.nan_to_num(largest[i])),
+                name=f"{name}[{i}]", t=run.t[inside], found=getattr(run, name)[inside, i],
+                wanted=wanted[:, i], allowed=atol + rtol * float(np.nan_to_num(largest[i])),
                 basis=f"rtol {rtol:g} of {largest[i]:.3g}" + (f", atol {atol:g}" if atol else ""),
             )  # fmt: skip
 

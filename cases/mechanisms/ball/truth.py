@@ -184,8 +184,8 @@ class Motion:
         work = energy.sum(axis=1) - m * (0.5 * first.v**2 + self.ball.gravity * first.h)
         full = len(self.arcs) >= MAX_ARCS
         return Trajectory(
-            t=t, q=h[:, None], v=v[:, None], gap=h[:, None], lam=lam[:, None], energy=energy, mode=mode[:, None],
-            events=self.events, steps=len(self.arcs),
+            t=t, q=h[:, None], v=v[:, None], gap=h[:, None], lam=lam[:, None], energy=energy,
+            mode=mode[:, None], events=self.events, steps=len(self.arcs),
             outcome=Outcome.STEP_LIMIT if full else Outcome.FINISHED,
             message=f"more than {MAX_ARCS} arcs" if full else "",
             ledger=Ledger(contact=work[:, None], input=np.zeros_like(t), dissipated=np.zeros_like(t)),

@@ -43,8 +43,8 @@ _FIXED = "Runge-Kutta 4 with located events, twenty steps a contact"
 _KEPT = "what acts on one ball acts on its neighbour"
 
 _OTHER_PHYSICS = (
-    ("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT), ("pinocchio", "impulse_simultaneous", IMPACT),
-    ("pinocchio", "admm", STEPPING),
+    ("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT),
+    ("pinocchio", "impulse_simultaneous", IMPACT), ("pinocchio", "admm", STEPPING),
 )  # fmt: skip
 """Engines whose constants are a restitution, or their own: the others must pass the audit."""
 

@@ -53,8 +53,8 @@ METRICS = {
 }
 FOLLOWING = {
     "tracking_error": CaseMetric(
-        doc="distance of the flange from the path that its controller follows", unit="m", number=_tracking_error,
-        always=True,
+        doc="distance of the flange from the path that its controller follows", unit="m",
+        number=_tracking_error, always=True,
     ),
 }  # fmt: skip
 """Of a robot under control alone."""

@@ -12,8 +12,8 @@ from crossbody.cases.case import Value
 from crossbody.cases.mechanisms.maze.geometry import Maze, tilted_gravity
 
 (
-    RADIUS, DRAG, RINGS, ON, MOST_TURN, MOST_TORQUE, WN, OMEGA, BALL_MASS, BALL_INERTIA, MAZE_INERTIA, GRAVITY, TOP2,
-    TOP1, TOP0, CENTRE2, CENTRE1, CENTRE0, TABLE,
+    RADIUS, DRAG, RINGS, ON, MOST_TURN, MOST_TORQUE, WN, OMEGA, BALL_MASS, BALL_INERTIA,
+    MAZE_INERTIA, GRAVITY, TOP2, TOP1, TOP0, CENTRE2, CENTRE1, CENTRE0, TABLE,
 ) = range(19)  # fmt: skip
 """Of ball and maze, then what the controller believes of them, and its gains on top of a ring and in the centre."""
 INNER, OUTER, GAPS, REACH, PHASE, COLUMNS = range(6)

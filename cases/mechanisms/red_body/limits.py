@@ -63,8 +63,8 @@ _KNOWN: dict[str, Mapping[tuple[str, str], str]] = {
 }  # fmt: skip
 """Variant -> engines that follow other equations than the case."""
 _OTHER_PHYSICS = (
-    ("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", RIGID), ("pinocchio", "impulse_simultaneous", RIGID),
-    ("pinocchio", "admm", RIGID),
+    ("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", RIGID),
+    ("pinocchio", "impulse_simultaneous", RIGID), ("pinocchio", "admm", RIGID),
 )  # fmt: skip
 """Engines whose constants are a restitution, or their own."""
 

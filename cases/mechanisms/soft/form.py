@@ -27,8 +27,8 @@ ALONG = (1.0, 0.0, 0.0)
 
 
 NAMES = (
-    "kp", "cp", "width", "jaw", "squeeze", "close_start", "close_end", "release", "release_time", "pad_mass", "k", "ks",
-    "gain_p", "gain_d", "gain_i",
+    "kp", "cp", "width", "jaw", "squeeze", "close_start", "close_end", "release",
+    "release_time", "pad_mass", "k", "ks", "gain_p", "gain_d", "gain_i",
 )  # fmt: skip
 """Of the numbers that a force reads of the fingers."""
 KP, CP, WIDTH, JAW, SQUEEZE, START, STOP, RELEASE, TIME, PAD_MASS, K, KS, GAIN_P, GAIN_D, GAIN_I = range(len(NAMES))
@@ -138,6 +138,6 @@ def on_axis(case: Case, powered: bool = True, steady: bool = False) -> Form:
     )  # fmt: skip
     return Form(
         case=formed(case, _scene(p), to_scene @ case.q0, to_scene @ case.v0, law=case.law, force=acting),
-        to_case=lambda q, v: (q @ to_case.T, v @ to_case.T), to_scene=lambda q, v: (q @ to_scene.T, v @ to_scene.T),
-        rows=(0, 1),
+        to_case=lambda q, v: (q @ to_case.T, v @ to_case.T), to_scene=lambda q,
+        v: (q @ to_scene.T, v @ to_scene.T), rows=(0, 1),
     )  # fmt: skip

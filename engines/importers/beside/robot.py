@@ -147,10 +147,10 @@ def measured(robot: Any, job: Any) -> dict[str, Any]:
     }
     named = {theirs[i][0]: name for name, i in found.items()}
     told: dict[str, Any] = {
-        "status": "read", "version": robot.version, "hidden": dict(robot.hidden), "unseen": dict(robot.unseen),
-        "refused": list(robot.refused),
-        "numbers": numbers,
-        "precision": robot.precision, "missing": [name for name, *_ in ours if name not in found], "extra": extra,
+        "status": "read", "version": robot.version, "hidden": dict(robot.hidden),
+        "unseen": dict(robot.unseen), "refused": list(robot.refused), "numbers": numbers,
+        "precision": robot.precision, "missing": [name for name, *_ in ours if name not in found],
+        "extra": extra,
         "actuators": {name: sorted(named.get(one, one) for one in of) for name, of in robot.actuators.items()},
         "loops": [[kind, [named.get(one, one) for one in of], list(numbers)] for kind, of, numbers in robot.loops],
         "tendons": {name: list(numbers) for name, numbers in robot.tendons.items()}, "states": [],
