@@ -138,6 +138,6 @@ def on_axis(case: Case, powered: bool = True, steady: bool = False) -> Form:
     )  # fmt: skip
     return Form(
         case=formed(case, _scene(p), to_scene @ case.q0, to_scene @ case.v0, law=case.law, force=acting),
-        to_case=lambda q, v: (q @ to_case.T, v @ to_case.T), to_scene=lambda q,
-        v: (q @ to_scene.T, v @ to_scene.T), rows=(0, 1),
+        to_case=lambda q, v: (q @ to_case.T, v @ to_case.T), rows=(0, 1),
+        to_scene=lambda q, v: (q @ to_scene.T, v @ to_scene.T),
     )  # fmt: skip
