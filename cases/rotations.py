@@ -36,13 +36,7 @@ def turned(q: Floats, rest: Floats) -> Floats:
 
 
 def rates(q: Floats, v: Floats, quaternions: Sequence[int]) -> Floats:
-    """Return q' (n, nq) of velocities (n, nv) that have the angular velocity in body axes, rad/s, for a quaternion.
-
-    Args:
-        q: positions (n, nq).
-        v: velocities (n, nv).
-        quaternions: first index in q of each.
-    """
+    """Return q' (n, nq) of velocities (n, nv), which for a quaternion are the angular ones in body axes, rad/s."""
     parts, at, row = [], 0, 0
     for first in quaternions:
         parts.append(v[:, row : row + first - at])
@@ -69,13 +63,7 @@ def ways(q: Floats, quaternions: Sequence[int]) -> Floats:
 
 
 def differences(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
-    """Return |q - other| (n, nq); in the first entry of a quaternion the angle between both, rad, and 0 in the others.
-
-    Args:
-        q: positions (n, nq).
-        other: positions (n, nq).
-        quaternions: first index in q of each.
-    """
+    """Return |q - other| (n, nq); in the first entry of a quaternion the angle, rad, and 0 in the others."""
     found: Floats = np.abs(q - other)
     for at in quaternions:
         entries = slice(at, at + 4)

@@ -225,12 +225,7 @@ class Contacts:
         return found, ways
 
     def ends(self, poses: Poses, contact: Contact) -> tuple[Pose, Pose]:
-        """Return the poses of both shapes of a contact (..., 3, 3) and (..., 3).
-
-        Args:
-            poses: of the bodies.
-            contact: one of `all`.
-        """
+        """Return from the bodies' poses those of both shapes of a contact (..., 3, 3) and (..., 3)."""
         one, two = (self._place(poses, self.number[shape.name]) for shape in (contact.first, contact.second))
         return one, two
 

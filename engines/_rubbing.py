@@ -72,12 +72,7 @@ class Rubbing:
         self.nc = tangent
 
     def rows(self, poses: Poses, pushes: Iterable[Push]) -> tuple[Floats, Modes]:
-        """Return the multipliers (nc,) and the modes of all rows.
-
-        Args:
-            poses: of the bodies.
-            pushes: what the engine's contacts do.
-        """
+        """Return the multipliers (nc,) and the modes of all rows, from the bodies' poses."""
         lam, slides = np.zeros(self.nc), dict[int, bool]()
         met = None
         for push in pushes:
@@ -123,13 +118,7 @@ class Stepper(Protocol):
 
 
 def why_no_steps(engine: str, scene: Scene, bounds: bool = False) -> str | None:
-    """Return why an engine that steps contacts with friction cannot run a scene; None if it can.
-
-    Args:
-        engine: its name in a sentence.
-        scene: with friction.
-        bounds: whether it has bounds of joints.
-    """
+    """Return why an engine that steps contacts, and perhaps bounds, cannot run a scene with friction; None if it can."""
     if dry := next((part for part, _ in scene.dry), None):
         return f"{engine} steps contacts alone, and {dry.name!r} has dry friction (friction_loss, without=friction)."
     if scene.loops:

@@ -14,12 +14,6 @@ MATCHED = "matched"
 def chosen(engine: str, profile: str, known: Mapping[str, Parameter], given: Mapping[str, Any]) -> dict[str, Value]:
     """Every setting's value: the user's where given, else the default.
 
-    Args:
-        engine: whose settings, for the messages.
-        profile: likewise.
-        known: the settings that the profile has.
-        given: what the user asked for.
-
     Raises:
         UnknownName: for a setting that the profile does not have; the valid ones are listed.
         InvalidValue: for a value outside what the setting admits.

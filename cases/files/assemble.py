@@ -17,11 +17,6 @@ DEPENDENT = 1e-9  # singular value of the rows, over the largest, that counts as
 def assembled(model: Any, q: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Return the nearest start with every loop closed: Newton's method, each step the least in the metric of M.
 
-    Args:
-        model: MuJoCo's.
-        q: positions (nq,).
-        v: velocities (nv,).
-
     Returns:
         Positions (nq,) and velocities (nv,) that keep the loops closed.
 

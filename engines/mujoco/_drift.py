@@ -22,13 +22,7 @@ from crossbody.engines.nearest import Pose, cross
 
 
 class Drift:
-    """H' v of the contacts of a scene, of the distances of its tendons between points, and of angles of ball joints.
-
-    Args:
-        scene: whose.
-        model: built from it.
-        contacts: of the scene.
-    """
+    """H' v of the contacts of a scene, of the distances of its tendons between points, and of angles of ball joints."""
 
     def __init__(self, scene: Scene, model: Any, contacts: Contacts) -> None:
         self.model, self.data, self.contacts = model, mujoco.MjData(model), contacts

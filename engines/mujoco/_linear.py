@@ -60,13 +60,7 @@ class Stand:
 
 
 def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, ...]:
-    """What mjd_transitionFD makes of an equilibrium.
-
-    Args:
-        mechanism: its module here.
-        case: the scene.
-        spot: the equilibrium.
-    """
+    """What mjd_transitionFD makes of an equilibrium of a case of a mechanism."""
     case = in_contact(case)
     dt = float(mechanism.default_step(case, "matched"))
     with captured():

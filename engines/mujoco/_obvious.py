@@ -30,13 +30,7 @@ FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC
 
 
 class Obvious(Rows):
-    """Rows by shapes where they are distances of shapes; closed ones push or do not, MuJoCo keeps no memory.
-
-    Args:
-        scene: with its bounds.
-        model: of `obvious`.
-        data: to be looked at.
-    """
+    """Rows by shapes where they are distances of shapes; closed ones push or do not, MuJoCo keeps no memory."""
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
         super().__init__(by_shapes(scene), model, data)

@@ -206,11 +206,7 @@ class Spans:
 
 
 class Strings:
-    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first.
-
-    Args:
-        model, placed, tendons: as of `Spans`.
-    """
+    """Bounds of the distances of two points, in the order of the scene's tendons, the lower one first."""
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], tendons: Sequence[Tendon]) -> None:
         self.spans = Spans(model, placed, tendons)

@@ -145,11 +145,7 @@ class JumpCheck:
 
 
 def unwrapped(times: Floats, values: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """An angle without its wraps: whole turns taken off, from each of them on.
-
-    Args:
-        times (n,): s.
-        values (n,): rad.
+    """An angle (n,), rad, at times, s, without its wraps: whole turns taken off, from each of them on.
 
     Returns:
         The angle, and the indices where it wrapped.

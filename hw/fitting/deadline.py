@@ -11,11 +11,7 @@ class TimeOver(Exception):  # noqa: N818 - no error: it ends an identification
 
 
 class Deadline:
-    """A time limit that is looked at before every run of a window.
-
-    Args:
-        seconds: from now on.
-    """
+    """A time limit, s from now on, that is looked at before every run of a window."""
 
     def __init__(self, seconds: float = math.inf) -> None:
         self.seconds, self._end = seconds, time.monotonic() + seconds

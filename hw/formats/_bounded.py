@@ -137,10 +137,6 @@ class Chunks:
     """The chunks of one file, kept unfolded as far as a part of its budget allows.
 
     The first ones are kept, not the last: all passes go through a file from its beginning.
-
-    Args:
-        path: the file.
-        budget: what it may unfold to.
     """
 
     def __init__(self, path: Path, budget: Budget) -> None:

@@ -35,10 +35,6 @@ class RosbagReader:
 
     A ROS 1 bag and most ROS 2 bags carry the definitions of their messages; where one does not,
     those of ROS 2 Humble are taken, and a topic of an unknown type is refused.
-
-    Args:
-        path: the bag.
-        what: name of the format, for messages.
     """
 
     def __init__(self, path: Path, what: str) -> None:

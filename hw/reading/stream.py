@@ -112,13 +112,7 @@ def _usual(raw: NDArray[Any]) -> float:
 
 
 def collect(blocks: Iterable[Rows], plan: Plan, group: Group, limit: int) -> Rows:
-    """Join blocks, filling arrays in place: little more than the result is ever in memory.
-
-    Args:
-        blocks: the rows of one group.
-        plan: whose rows they are.
-        group: the group.
-        limit: largest size, bytes.
+    """Join blocks up to `limit` bytes, filling arrays in place: little more than the result is ever in memory.
 
     Raises:
         LogFormatError: if there are no rows, or more than the limit admits; the announced number

@@ -18,16 +18,10 @@ ROUNDS = 2
 
 
 def fitted_starts(model: Model, numbers: Mapping[str, Value], cut: Sequence[Window], span: float) -> tuple[Window, ...]:
-    """The windows with starts that fit their first samples best, by the model and its recorded inputs.
+    """The windows with starts that fit their first `span` seconds best, by the model and its recorded inputs.
 
     A polynomial through the samples beside an instant knows nothing of the torques; at the first sample
     of a log, where there is none before it, its rate is tens of times noisier than that of the model.
-
-    Args:
-        model: with `places`.
-        numbers: its parameters.
-        cut: the windows.
-        span: length of what is fitted, s.
     """
     return tuple(_fitted(model, numbers, window, span) for window in cut)
 

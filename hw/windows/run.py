@@ -16,13 +16,7 @@ REFERENCE = {"rtol": 1e-8}  # settings of the reference: far below what a rig me
 
 
 def run_once(case: Case, solver: str, **options: Any) -> Trajectory:
-    """One motion of a case by the reference.
-
-    Args:
-        case: the scene.
-        solver: "compiled", "ida" or "cvode".
-        options: of `reference.Options`.
-    """
+    """One motion of a case by the reference: a `solver` of its profiles, and `reference.Options`."""
     given = case.inputs
     return simulate(
         system_of(case), case.q0, case.v0, case.t_end, solver=solver, fsm=case.fsm,

@@ -38,14 +38,7 @@ def key(number: int, case: Case) -> str:
 
 
 def publish(out: Path, name: str, tables: Mapping[str, pd.DataFrame], told: Mapping[str, Any]) -> None:
-    """Write the tables of a study without verdicts (Parquet, CSV, JSON) and its page, all or nothing.
-
-    Args:
-        out: the output folder.
-        name: of the study.
-        tables: stem of the files -> rows.
-        told: provenance.
-    """
+    """Write the tables of a study without verdicts (Parquet, CSV, JSON) and its page, all or nothing."""
     with output.folder(out, name) as made:
         study.write(made, [], study.judge([], {}), told)
         for stem, rows in tables.items():

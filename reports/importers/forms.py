@@ -21,12 +21,7 @@ Change = Callable[[Node, Mapping[Node, Place]], None]
 
 
 class Forms:
-    """Forms of one file, which are there as long as it is entered.
-
-    Args:
-        path: of the file.
-        open_form: returns the audit of a form.
-    """
+    """Forms of one file, each audited as `open_form` returns it, which are there as long as it is entered."""
 
     def __init__(self, path: Path, open_form: Callable[[Path], Any]) -> None:
         self.path, self._open = path, open_form

@@ -19,10 +19,6 @@ def covered(case: Case, budget: float) -> Case:
 
     Engines without friction run what never comes to any.
 
-    Args:
-        case: the scene.
-        budget: time that a run may take, s.
-
     Raises:
         CaseUnsupported: if shapes of the file surely meet whose contacts no row stands for:
             nothing could be judged.

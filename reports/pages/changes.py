@@ -24,13 +24,7 @@ VALUES = columns(
 
 
 def changes(now: Sequence[Row], before: Sequence[Row], name: str) -> Section:
-    """The section that says what changed since an earlier run.
-
-    Args:
-        now: verdicts with `label` and `who`.
-        before: the earlier ones.
-        name: folder of the earlier run.
-    """
+    """The section that says what changed in verdicts, with `label` and `who`, since a run of that name."""
     known, here = _by_key(before), _by_key(now)
     kept = [
         row | {f"{field}_before": known[key][field] for field in ("verdict", "value")}

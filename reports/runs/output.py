@@ -174,9 +174,6 @@ def _own(made: Path) -> set[str]:
 def gather(made: Path) -> Path:
     """Put the tables of the other studies of an output folder beside those of one that is being written.
 
-    Args:
-        made: as `folder` yields it.
-
     Returns:
         The output folder.
     """

@@ -8,12 +8,7 @@ from crossbody.cases.arrays import Floats
 
 
 def pushes(centres: Floats, lam: Floats, radius: float) -> Floats:
-    """Both arrows of every pair of neighbours: on the left ball and on the right one.
-
-    Args:
-        centres: of the balls (n, balls, 2), m.
-        lam: of the pairs (n, balls - 1), N.
-        radius: of a ball, m.
+    """Both arrows of every pair of neighbours: on the left ball and on the right one (centres in m, lam in N).
 
     Returns:
         Point and force (n, 2 (balls - 1), 4), m and N.

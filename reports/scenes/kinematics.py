@@ -14,12 +14,7 @@ Pose = tuple[Floats, Floats]  # origins (n, 3), m, and rotations (n, 3, 3) of on
 
 
 def body_poses(scene: Scene, q: Floats) -> Mapping[str, Pose]:
-    """Return the pose of every body by its name, and of the world by the empty one.
-
-    Args:
-        scene: what moves.
-        q: positions (n, nq).
-    """
+    """Return the pose at positions q (n, nq) of every body by its name, and of the world by the empty one."""
     found: dict[str, Pose] = {"": (np.zeros((len(q), 3)), np.tile(np.eye(3), (len(q), 1, 1)))}
     joints: dict[str, list[tuple[Joint, Floats]]] = {}
     at = 0

@@ -99,12 +99,6 @@ def shrink(
 ) -> tuple[dict[str, Value], int]:
     """Move parameters to their defaults: all the way if it still fails, else part of it, then to a few digits.
 
-    Args:
-        parameters: at which it fails.
-        own: the defaults.
-        fails: whether it still does.
-        tries: how often that may be asked.
-
     Returns:
         What has to be said, and how often was asked. A failure that does not repeat is returned as it came.
     """

@@ -37,10 +37,6 @@ def identity(specs: Sequence[Spec], chunk: int, about: Mapping[str, Any]) -> dic
 class Store:
     """The folder of one sweep.
 
-    Args:
-        path: the folder.
-        about: its identity.
-
     Raises:
         OutputError: if the folder cannot be written, or holds another sweep or somebody else's files.
     """

@@ -74,12 +74,7 @@ class Baseline:
 
 
 def place(module: Path, test: str) -> Path:
-    """The file of one test: a name out of a test's parameters cannot leave the folder.
-
-    Args:
-        module: file of the test.
-        test: its name, with its parameters.
-    """
+    """The file of one test: a name out of a test's parameters cannot leave the folder."""
     safe = re.sub(r"[^\w\-\[\]]+", "-", test)[:100]
     if safe != test:  # two names may not become one
         safe += "-" + hashlib.sha256(test.encode()).hexdigest()[:8]

@@ -57,12 +57,7 @@ _ELASTIC = ("linear", "hertz")
 
 
 def answer(name: str, row: Row) -> Floats | None:
-    """Speeds under a rule (n,), m/s; None where it has no answer.
-
-    Args:
-        name: one of `RULES`.
-        row: the balls.
-    """
+    """Speeds under one of `RULES` (n,), m/s; None where it has no answer."""
     if (name in _INTEGRATED and row.n > LARGEST) or (name in _ELASTIC and row.zeta > 0.0):
         return None
     return _cached(name, row.masses.tobytes(), row.lifted, row.speed, row.gap, row.a0, row.zeta)

@@ -39,12 +39,7 @@ def pair(first: str, second: str, mu: float, own: RowLaw) -> Pair:
 
 
 def field(p: Mapping[str, float], steep: float = 0.0) -> Vector:
-    """Return gravity over a floor that falls along x, m/s^2.
-
-    Args:
-        p: with gravity.
-        steep: tangent of the floor's angle.
-    """
+    """Return gravity over a floor that falls along x at an angle of this tangent, m/s^2."""
     length = math.hypot(1.0, steep)
     return (p["gravity"] * steep / length, 0.0, -p["gravity"] / length)
 

@@ -53,11 +53,7 @@ def stages_in_order(events: Sequence[Event]) -> int:
 
 @dataclass(frozen=True)
 class Fall:
-    """The motion of the box on a slab that stands still, from its release to the blow of its right corner.
-
-    Args:
-        p: parameters of the case `red_body`.
-    """
+    """The motion of the box on a slab that stands still, from its release to the blow of its right corner."""
 
     p: Mapping[str, float]
 
