@@ -118,7 +118,7 @@ class Stepper(Protocol):
 
 
 def why_no_steps(engine: str, scene: Scene, bounds: bool = False) -> str | None:
-    """Return why an engine that steps contacts, and perhaps bounds, cannot run a scene with friction; None if it can."""
+    """Return why an engine that steps contacts, perhaps bounds, cannot run a scene with friction; None if it can."""
     if dry := next((part for part, _ in scene.dry), None):
         return f"{engine} steps contacts alone, and {dry.name!r} has dry friction (friction_loss, without=friction)."
     if scene.loops:
