@@ -136,8 +136,7 @@ def _by_sign(run: Trajectory) -> tuple[Contact, ...]:
 def _crossings(t: Floats, gap: Floats) -> Floats:
     """Instants at which the gap falls through zero, by a straight line between samples."""
     i = np.flatnonzero((gap[:-1] > 0.0) & (gap[1:] <= 0.0))
-    crossed: Floats = t[i] + (t[i + 1] - t[i]) * gap[i] / (gap[i] - gap[i + 1])
-    return crossed
+    return t[i] + (t[i + 1] - t[i]) * gap[i] / (gap[i] - gap[i + 1])
 
 
 def at(run: Trajectory, values: Floats, t: float) -> float:

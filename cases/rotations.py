@@ -31,8 +31,7 @@ def turned(q: Floats, rest: Floats) -> Floats:
     sine = np.linalg.norm(x, axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, np.abs(w))
     scale = np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0)
-    vector: Floats = np.where(w < 0.0, -1.0, 1.0) * scale * x
-    return vector
+    return np.where(w < 0.0, -1.0, 1.0) * scale * x
 
 
 def rates(q: Floats, v: Floats, quaternions: Sequence[int]) -> Floats:

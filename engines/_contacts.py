@@ -376,8 +376,7 @@ def _sizes(contact: Contact) -> tuple[Floats, Floats]:
 
 def _last(when: NDArray[np.bool_]) -> Indices:
     """Return for every instant the last one so far of those marked (m,); -1 before all."""
-    found: Indices = np.maximum.accumulate(np.where(when, np.arange(len(when)), -1))
-    return found
+    return np.maximum.accumulate(np.where(when, np.arange(len(when)), -1))
 
 
 def _within_reach(contact: Contact, at: Pose, by: Pose) -> NDArray[np.bool_]:

@@ -31,8 +31,7 @@ def form_of(case: Case, powered: bool = True, steady: bool = False) -> Form | No
     check = getattr(module(case.mechanism), "check_start", None)
     if check is not None:
         check(case.parameters, case.q0, case.v0)
-    found: Form = case.form(case, powered, steady)
-    return found
+    return case.form(case, powered, steady)
 
 
 def why_no_form(case: Case) -> str | None:

@@ -68,8 +68,7 @@ def least_push(G: Floats, demand: Floats) -> Floats:
     from scipy.optimize import nnls  # which takes longer to import than most runs
 
     found, _ = nnls(E, goal)
-    lam: Floats = size * found / max(1.0 - float(E[-1] @ found), ULP)
-    return lam
+    return size * found / max(1.0 - float(E[-1] @ found), ULP)
 
 
 class LevelMachine:

@@ -72,8 +72,7 @@ class Line:
     @cached_property
     def reduced(self) -> Floats:
         """M of every row (nc,), kg."""
-        found: Floats = 1.0 / (self.H**2 @ (1.0 / self.masses))
-        return found
+        return 1.0 / (self.H**2 @ (1.0 / self.masses))
 
     @cached_property
     def presses(self) -> Floats:
@@ -84,14 +83,12 @@ class Line:
     @cached_property
     def _balance(self) -> Floats:
         """What gives lam (nc,) of the generalised forces that the rows exert (n,)."""
-        found: Floats = np.asarray(np.linalg.pinv(self.H.T), dtype=np.float64)
-        return found
+        return np.asarray(np.linalg.pinv(self.H.T), dtype=np.float64)
 
     def spring(self, q: Floats, v: Floats) -> Floats:
         """Lam of every row as if it were alone and active (..., nc), N."""
         h = self.gaps(q)
-        found: Floats = self.reduced * (self.presses - self.a1 * self.rates(v) - self.a0 * h - self.a2 * h**3)
-        return found
+        return self.reduced * (self.presses - self.a1 * self.rates(v) - self.a0 * h - self.a2 * h**3)
 
     @cached_property
     def _rounding(self) -> float:
@@ -105,31 +102,26 @@ class Line:
 
     def rates(self, v: Floats) -> Floats:
         """H v (..., nc), m/s."""
-        found: Floats = v @ self.H.T
-        return found
+        return v @ self.H.T
 
     def acceleration(self, q: Floats, v: Floats) -> Floats:
         """V' under `memoryless` (n,), m/s^2."""
-        found: Floats = self.memoryless(q, v) @ self.H / self.masses - self.gravity
-        return found
+        return self.memoryless(q, v) @ self.H / self.masses - self.gravity
 
     def transmitted(self, change: Floats) -> Floats:
         """What each row passes on (..., nc), from change (..., n) of velocity (or of it a second) beside gravity's."""
-        found: Floats = (self.masses * change) @ self._balance.T
-        return found
+        return (self.masses * change) @ self._balance.T
 
     def memoryless(self, q: Floats, v: Floats, h: Floats | None = None) -> Floats:
         """max(0, lam) of every row whose gap h, of q if not given, is closed, lam where it cannot open (..., nc), N."""
         lam = self.spring(q, v)
         closed = np.where((self.gaps(q) if h is None else h) <= 0.0, np.maximum(lam, 0.0), 0.0)
-        found: Floats = np.where(self.unilateral, closed, lam)
-        return found
+        return np.where(self.unilateral, closed, lam)
 
     def modes(self, h: Floats, rates: Floats, lam: Floats) -> Bytes:
         """Free above; below in contact while it pushes, or as it touches (..., nc)."""
         below = np.where((lam > 0.0) | ((h == 0.0) & (rates < 0.0)), CONTACT, BALLISTIC)
-        found: Bytes = np.where(self.unilateral, np.where(h > 0.0, FREE, below), int(Mode.BILATERAL)).astype(np.int8)
-        return found
+        return np.where(self.unilateral, np.where(h > 0.0, FREE, below), int(Mode.BILATERAL)).astype(np.int8)
 
     def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Gaps (m, nc), m, and energies (m, 2), J, of m states."""

@@ -27,8 +27,7 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
         return system.mass_matrix(q)
 
     def bias(q: Floats, v: Floats) -> Floats:
-        f: Floats = -system.terms(q, v)[1]
-        return f
+        return -system.terms(q, v)[1]
 
     def H(q: Floats) -> Floats:
         return system.constraint(q)[0]

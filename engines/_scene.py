@@ -39,8 +39,7 @@ def drag(constants: Any, v: Any) -> Any:
 def stored(constants: Vector, x: Floats) -> Floats:
     """Return the energy of a spring, J."""
     k0, k1, k2 = constants
-    total: Floats = k0 * x**2 / 2 + k1 * x**3 / 3 + k2 * x**4 / 4
-    return total
+    return k0 * x**2 / 2 + k1 * x**3 / 3 + k2 * x**4 / 4
 
 
 def derivatives(c: Vector) -> tuple[Vector, Vector, Vector]:

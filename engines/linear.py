@@ -76,8 +76,7 @@ class Chart:
     def slope(self, J: Floats) -> Floats:
         """The derivative (n, 2 n) of v' from that of y'' by (y, y') (ny, 2 ny)."""
         ny = len(self.S)
-        found: Floats = self.T @ np.hstack([J[:, :ny] @ self.S, J[:, ny:] @ self.S])
-        return found
+        return self.T @ np.hstack([J[:, :ny] @ self.S, J[:, ny:] @ self.S])
 
     def tangent(self, way: Tangent) -> Tangent:
         """The same way in the case's coordinates."""

@@ -99,8 +99,7 @@ def tilt(floor: Pose, at: Pose) -> Floats:
 def aslant(at: Pose, by: Pose) -> Floats:
     """Return the sine of the angle between axes of two capsules (...)."""
     across = cross(at[0][..., 2], by[0][..., 2])
-    sine: Floats = np.sqrt(_dot(across, across))
-    return sine
+    return np.sqrt(_dot(across, across))
 
 
 def crossing(at: Pose, by: Pose) -> Floats:
@@ -134,8 +133,7 @@ def corners(kind: str, size: Floats) -> Floats:
     """Return the points (..., places, 3) that shapes of a type in `ROUND` are round, in their axes."""
     if kind == "hull":
         return size
-    points: Floats = SIGNS * size[..., None, :] if kind == "box" else size[..., None, 1:2] * ENDS
-    return points
+    return SIGNS * size[..., None, :] if kind == "box" else size[..., None, 1:2] * ENDS
 
 
 def _lowest(kind: str, size: Floats, n: Floats) -> Floats:
@@ -290,8 +288,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Return vector products (..., 3); NumPy's own costs more than all else here for few vectors."""
-    found: Floats = a.take(NEXT, -1) * b.take(LAST, -1) - a.take(LAST, -1) * b.take(NEXT, -1)
-    return found
+    return a.take(NEXT, -1) * b.take(LAST, -1) - a.take(LAST, -1) * b.take(NEXT, -1)
 
 
 def _inside(rotation: Floats, world: Floats) -> Floats:

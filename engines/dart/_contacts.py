@@ -225,8 +225,7 @@ class Rubs:
     def _velocity(solid: Any, point: Any) -> Floats:
         node = solid.getShapeFrame().asShapeNode().getBodyNodePtr()
         own = node.getWorldTransform().inverse().multiply(_placed(point)).translation()
-        found: Floats = np.array(node.getLinearVelocity(own))
-        return found
+        return np.array(node.getLinearVelocity(own))
 
     def pose(self, body: str) -> Pose:
         """See `Stepper`."""

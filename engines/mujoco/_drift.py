@@ -93,8 +93,7 @@ class Drift:
 
         def carried(bodies: Indices, points: Floats) -> Floats:
             k = self.carriers[bodies]
-            velocity: Floats = twists[:, k, 3:] + cross(twists[:, k, :3], points - centres[:, k])
-            return velocity
+            return twists[:, k, 3:] + cross(twists[:, k, :3], points - centres[:, k])
 
         def poses(body: str) -> Pose:
             return R[:, self.numbers[body]], p[:, self.numbers[body]]

@@ -157,8 +157,7 @@ def _pressed(stand: Stand, slope: Callable[[], Floats]) -> Floats:
     if data.efc_force[np.isin(data.efc_type, ONE_WAY)].min() > force:
         return first
     near, far = (_under(stand, -times * force * J.sum(axis=0), slope) for times in (1.0, 2.0))
-    extrapolated: Floats = 2.0 * near - far
-    return extrapolated
+    return 2.0 * near - far
 
 
 def _under(stand: Stand, load: Floats, slope: Callable[[], Floats]) -> Floats:

@@ -183,8 +183,7 @@ def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
     root = np.linalg.inv(np.linalg.cholesky(M))
     free = null_space(H @ root.T, rcond=DEPENDENT) if len(H) else np.eye(n)
     mobility = root.T @ free @ free.T @ root
-    found: Floats = np.block([[np.zeros((n, n)), np.eye(n)], [mobility @ K, mobility @ D]])
-    return found
+    return np.block([[np.zeros((n, n)), np.eye(n)], [mobility @ K, mobility @ D]])
 
 
 def build(

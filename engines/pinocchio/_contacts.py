@@ -89,8 +89,7 @@ class ContactRows:
 
             def carried(bodies: Indices, points: Floats) -> Floats:
                 twist = moving[:, bodies]
-                velocity: Floats = twist[..., :3] + cross(twist[..., 3:], points - at[:, bodies])
-                return velocity
+                return twist[..., :3] + cross(twist[..., 3:], points - at[:, bodies])
 
             return closing(self.contacts.touches(self._stacked(R, p), rows, along), carried)
 

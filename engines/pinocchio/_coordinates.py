@@ -55,13 +55,11 @@ class Coordinates:
 
     def theirs(self, q: Floats) -> Floats:
         """Return Pinocchio's positions (..., nq)."""
-        found: Floats = (q - self.reference)[..., self._theirs]
-        return found
+        return (q - self.reference)[..., self._theirs]
 
     def ours(self, q: Floats) -> Floats:
         """Return the scene's positions (..., nq)."""
-        found: Floats = (q + self.reference)[..., self._ours]
-        return found
+        return (q + self.reference)[..., self._ours]
 
     def blocks(self, q: Floats) -> list[tuple[int, Floats]]:
         """Return for every free joint its first velocity and R (..., 3, 3), at Pinocchio's positions."""

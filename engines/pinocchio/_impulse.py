@@ -74,8 +74,7 @@ class Instant:
     def rates(self) -> Floats:
         """Rate of every gap (nc,), m/s; 0 where it stands still."""
         hd = self.rows.gaps(self.q, self.v)[1]
-        still: Floats = np.where(np.abs(hd) <= self.slow, 0.0, hd)
-        return still
+        return np.where(np.abs(hd) <= self.slow, 0.0, hd)
 
     def press(self) -> tuple[Floats, Floats]:
         """-h'' of every row that is not held, and its rounding (nc,), m/s^2."""

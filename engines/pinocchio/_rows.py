@@ -169,8 +169,7 @@ class PinRows:
     def delassus(self, q: Floats) -> Floats:
         """G = H M^-1 H^T (nc, nc)."""
         H = self.jacobian(q)
-        G: Floats = H @ np.linalg.solve(mass_matrix(self.model, self.data, q), H.T)
-        return G
+        return H @ np.linalg.solve(mass_matrix(self.model, self.data, q), H.T)
 
     def elastic(self, q: Floats, v: Floats) -> Floats:
         """max(b1, sqrt(b0)) |h'| + b0 |h| of every row (nc,), m/s^2."""

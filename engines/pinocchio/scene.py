@@ -498,8 +498,7 @@ def mechanics(scene: Scene, bodies: Bodies) -> dict[str, Any]:
         r = to.theirs(q)
         u = to.back(r, v)
         bodies.apply(r, u, tau)
-        total: Floats = to.velocities(r, pin.nonLinearEffects(model, data, r, u) - tau) - M(q) @ to.bend(r, u)
-        return total
+        return to.velocities(r, pin.nonLinearEffects(model, data, r, u) - tau) - M(q) @ to.bend(r, u)
 
     return {"masses": parts.masses(scene), "M": M, "bias": bias}
 

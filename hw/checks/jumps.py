@@ -108,8 +108,7 @@ def _slowly(values: Floats) -> Indices:
     bent = _bent(np.diff(values[::wide]))
     if len(bent) < FEWEST or not float(bent.max()) > (least := 2.0 * OUT * _noise(bent)):
         return np.zeros(0, np.int64)
-    found: Indices = (wide * np.flatnonzero(bent > least)[:, None] + np.arange(3 * wide)).ravel()
-    return found
+    return (wide * np.flatnonzero(bent > least)[:, None] + np.arange(3 * wide)).ravel()
 
 
 class _Suspects:

@@ -133,8 +133,7 @@ class RateCheck:
         if not self._rotates or most <= 0.5 * TURN:
             return 0.0
         turns = np.where(np.abs(steps) > 0.5 * TURN, TURN * np.rint(steps / TURN), 0.0)
-        found: Floats = np.add.reduceat(turns, np.arange(0, len(turns), SPAN))
-        return found
+        return np.add.reduceat(turns, np.arange(0, len(turns), SPAN))
 
     def _remember(self, dq: Floats, iv: Floats, rows: Rows, times: Floats) -> None:
         """Keep the first span of a block that disagrees by more than the mean size of both."""

@@ -164,8 +164,7 @@ def noise_correlation(Q: Floats, residual: Floats, layout: Layout) -> float:
         return high
     if excess(low) >= 0.0:
         return low
-    rho: float = np.float64(brentq(excess, low, high, xtol=1e-4)).item()
-    return rho
+    return np.float64(brentq(excess, low, high, xtol=1e-4)).item()
 
 
 def _shifted(X: Floats, series: tuple[slice, ...]) -> Floats:

@@ -101,8 +101,7 @@ class Differences:
 
     def _sums(self, x: Floats) -> Floats:
         r, owners = self.residual(x), self.layout.windows()
-        sums: Floats = np.bincount(owners, weights=r * r).astype(np.float64)
-        return sums
+        return np.bincount(owners, weights=r * r).astype(np.float64)
 
     @property
     def layout(self) -> Layout:

@@ -90,8 +90,7 @@ def weak(covariance: Floats, sizes: Floats, quantile: float) -> Floats:
     if not len(covariance):
         return np.zeros((0, 0))
     values, vectors = np.linalg.eigh(covariance / np.outer(sizes, sizes))
-    found: Floats = vectors[:, quantile * np.sqrt(np.maximum(values, 0.0)) > 1.0].T
-    return found
+    return vectors[:, quantile * np.sqrt(np.maximum(values, 0.0)) > 1.0].T
 
 
 def in_words(direction: Floats, names: Sequence[str]) -> str:

@@ -71,5 +71,4 @@ def _means(times: Floats, held: Floats, t: Floats) -> Floats:
     ends = np.append(t, 2.0 * t[-1] - t[-2])
     k = np.clip(np.searchsorted(times, ends, side="right") - 1, 0, len(times) - 1)
     at = total[k] + held[k] * (ends - times[k])[:, None]
-    means: Floats = np.diff(at, axis=0) / np.diff(ends)[:, None]
-    return means
+    return np.diff(at, axis=0) / np.diff(ends)[:, None]

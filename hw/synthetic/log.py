@@ -123,8 +123,7 @@ def _touch(force: Floats, sensors: Sensors, period: float, random: np.random.Gen
     c = math.exp(-sensors.touch_rate * period)
     y = lfilter([0.0, 1.0 - c], [1.0, -c], force, axis=0)
     y = y + sensors.touch_noise * random.standard_normal(y.shape)
-    rounded: Floats = sensors.touch_step * np.rint(y / sensors.touch_step) if sensors.touch_step else y
-    return rounded
+    return sensors.touch_step * np.rint(y / sensors.touch_step) if sensors.touch_step else y
 
 
 def _finish(time: Floats, channels: tuple[Channel, ...], period: float, about: str, engine: str) -> Log:

@@ -74,5 +74,4 @@ def advanced(y: Floats, yd: Floats, delay: Floats, turns: Sequence[int] = ()) ->
 def _log(one: Rotation, other: Rotation) -> Floats:
     if not len(one):
         return np.zeros((0, 3))
-    vector: Floats = (one * other.inv()).as_rotvec()
-    return vector
+    return (one * other.inv()).as_rotvec()

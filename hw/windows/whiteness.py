@@ -163,8 +163,7 @@ def _correlation(a: Sequence[Floats], b: Sequence[Floats], most: int) -> Correla
 def products(x: Floats, y: Floats, lags: NDArray[np.int64]) -> Floats:
     """Sums of x[i + lag] y[i] at lags, by FFT; 0 where they do not overlap."""
     size = 1 << (2 * max(len(x), int(np.max(np.abs(lags))) + 1) - 1).bit_length()
-    found: Floats = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)[lags]
-    return found
+    return np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)[lags]
 
 
 def _whitener(pieces: Sequence[Floats], order: int = ORDER) -> Floats:

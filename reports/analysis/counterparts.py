@@ -116,8 +116,7 @@ def _nearest(expected: Array, own: Array) -> Array:
     """Which of one's own poles stands for each expected one."""
     from scipy.optimize import linear_sum_assignment
 
-    order: Array = linear_sum_assignment(np.abs(expected[:, None] - own[None, :]))[1]
-    return order
+    return linear_sum_assignment(np.abs(expected[:, None] - own[None, :]))[1]
 
 
 def _clusters_apart(expected: Array, own: Array) -> float:

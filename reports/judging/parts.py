@@ -322,8 +322,7 @@ class Positions:
             entries = slice(at, at + 4)
             error[:, at : at + 3] = turned(q[:, entries], exact[:, entries])
             error[:, at + 3] = 0.0
-        scaled: Floats = error / self.scale
-        return scaled
+        return error / self.scale
 
     def sizes(self, error: Floats) -> Floats:
         """Return |error|, that of a rotation in the first entry of its quaternion."""

@@ -65,8 +65,7 @@ def differing(case: Case, entry: Entry) -> frozenset[str]:
 
 @cache
 def _table() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.is_file() else {}
-    return found
+    return json.loads(FILE.read_text(encoding="utf-8")) if FILE.is_file() else {}
 
 
 def _digest(case: Case) -> str:

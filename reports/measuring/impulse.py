@@ -29,8 +29,7 @@ def cumulative(run: Trajectory, t: Floats | None = None) -> Floats:
     """
     t = run.t if t is None else t
     pieces = 0.5 * np.diff(t)[:, None] * (run.lam[1:] + run.lam[:-1])
-    total: Floats = np.concatenate([np.zeros((1, run.lam.shape[1])), np.cumsum(pieces, axis=0)])
-    return total
+    return np.concatenate([np.zeros((1, run.lam.shape[1])), np.cumsum(pieces, axis=0)])
 
 
 def with_collisions(run: Trajectory, events: Sequence[Event]) -> Floats:

@@ -65,8 +65,7 @@ def floor_of(truth: Floats) -> float:
 
 def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
     """|difference| for a logarithmic axis, not below the floor that all engines share."""
-    difference: Floats = np.maximum(np.abs(mine - theirs), floor)
-    return difference
+    return np.maximum(np.abs(mine - theirs), floor)
 
 
 def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:

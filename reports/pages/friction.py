@@ -65,8 +65,7 @@ def _pressed(traces: Sequence[Trace]) -> tuple[Contact, int] | None:
 def _rows(trace: Trace, contact: Contact, place: int) -> Floats:
     """Normal force and both of friction (n, 3), N."""
     name, known = contact.normals[place], list(trace.about["contacts"])
-    found: Floats = trace.run.lam[:, [known.index(each) for each in (name, *(f"{name} {way}" for way in WAYS))]]
-    return found
+    return trace.run.lam[:, [known.index(each) for each in (name, *(f"{name} {way}" for way in WAYS))]]
 
 
 def _forces(trace: Trace, contact: Contact, place: int) -> tuple[Floats, Floats, tuple[Floats, Floats]]:

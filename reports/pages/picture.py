@@ -137,8 +137,7 @@ class _Camera:
         self.middle, self.scale, self.rows = middle, scale, rows
 
     def __call__(self, points: Floats) -> Floats:
-        found: Floats = (points - self.middle) @ self.rows[:2].T * (self.scale, -self.scale) + (WIDTH / 2, HEIGHT / 2)
-        return found
+        return (points - self.middle) @ self.rows[:2].T * (self.scale, -self.scale) + (WIDTH / 2, HEIGHT / 2)
 
     def depth(self, points: Floats) -> Floats:
         """How far behind the middle points are, m."""
@@ -190,8 +189,7 @@ def _outline(shape: scenes.Shape) -> Floats:
         x, y, r = shape["circle"]
         around: Floats = np.array([x, y]) + r * ROUND
         return around
-    points: Floats = np.asarray(shape["points"], dtype=np.float64)
-    return points
+    return np.asarray(shape["points"], dtype=np.float64)
 
 
 def _moved(points: Floats, stand: Floats) -> Floats:
@@ -203,8 +201,7 @@ def _moved(points: Floats, stand: Floats) -> Floats:
 
 def _hull(points: Floats) -> Floats:
     try:
-        found: Floats = points[ConvexHull(points).vertices]
-        return found
+        return points[ConvexHull(points).vertices]
     except QhullError:  # all on one line
         return points
 

@@ -10,8 +10,7 @@ from crossbody.reports.scenes._rows import pushes
 
 
 def _places(p: Parameters) -> Floats:
-    places: Floats = np.arange(int(p["n"])).astype(np.float64) * (2.0 * float(p["radius"]) + float(p["gap"]))
-    return places
+    return np.arange(int(p["n"])).astype(np.float64) * (2.0 * float(p["radius"]) + float(p["gap"]))
 
 
 def stage(p: Parameters) -> Stage:

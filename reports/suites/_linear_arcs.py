@@ -240,8 +240,7 @@ def _powers(F: Floats, step: float) -> Floats:
 
 
 def _expm(F: Floats, t: float) -> Floats:
-    exponential: Floats = expm(F * t)
-    return exponential
+    return expm(F * t)
 
 
 def _within(F: Floats, x: Floats, t: float) -> Floats:

@@ -132,8 +132,7 @@ class Controller:
             target = pose.pose(p, r)
             aim = self._pose(target)
             speed = NONE if aim is None else np.linalg.solve(aim.Jy, rd)
-            torque: Floats = p["kp"] * (target[MOTORS] - y) + p["kd"] * (speed - rate) + at.hold
-            return torque
+            return p["kp"] * (target[MOTORS] - y) + p["kd"] * (speed - rate) + at.hold
         e, ed = r - at.z, rd - at.Jy @ rate
         self.integral = np.clip(self.integral + p["period"] * e, -p["clamp"], p["clamp"])
         a = np.linalg.solve(at.Jy, p["ki"] * self.integral + p["kp"] * e + p["kd"] * ed + rdd)

@@ -26,8 +26,7 @@ def circle(p: pose.Numbers, t: Floats) -> Floats:
     radius = p["radius"] * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
     angle = 2.0 * math.pi * p["frequency"] * t
     start = np.array([p["x"], p["y"], p["z"]])
-    path: Floats = start + np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(len(t))])
-    return path
+    return start + np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(len(t))])
 
 
 def _tracking_error(run: Trajectory, case: Case) -> float:

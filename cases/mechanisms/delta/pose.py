@@ -101,8 +101,7 @@ def tip_jacobians(p: Numbers, q: Floats) -> Floats:
         (c1, c2, c3), (s1, s2, s3) = np.cos([a, b, c]).tolist(), np.sin([a, b, c]).tolist()
         rows = [[0.0, l2 * c2 * s3, l2 * s2 * c3], [-l1 * s1, -l2 * s2, 0.0], [l1 * c1, l2 * c2 * c3, -l2 * s2 * s3]]
         blocks.append(rows)
-    turned: Floats = rotations(p) @ np.array(blocks)
-    return turned
+    return rotations(p) @ np.array(blocks)
 
 
 def closure(p: Numbers, q: Floats) -> Floats:
@@ -125,8 +124,7 @@ def gravity(p: Numbers, q: Floats) -> Floats:
 def holding_torque(p: Numbers, q: Floats) -> Floats:
     """Motor torques (3,), N m, that hold a regular pose: [B H^T](tau; lam) = dV/dq."""
     known = np.hstack([np.eye(9)[:, ::3], closure(p, q).T])
-    found: Floats = np.asarray(np.linalg.solve(known, gravity(p, q)), dtype=np.float64)[:3]
-    return found
+    return np.asarray(np.linalg.solve(known, gravity(p, q)), dtype=np.float64)[:3]
 
 
 def mass(p: Numbers, q: Floats) -> Floats:
@@ -147,8 +145,7 @@ def kicked(p: Numbers, q: Floats, impulse: Floats) -> Floats:
     """Velocities (9,) behind a Dirac impulse (3,), N s, on the flange at rest: M dv = Jv^T J + H^T L, H dv = 0."""
     H, push = closure(p, q), np.hstack(list(tip_jacobians(p, q))).T @ impulse / 3
     saddle = np.block([[mass(p, q), -H.T], [H, np.zeros((6, 6))]])
-    found: Floats = np.asarray(np.linalg.solve(saddle, np.concatenate([push, np.zeros(6)])), dtype=np.float64)[:9]
-    return found
+    return np.asarray(np.linalg.solve(saddle, np.concatenate([push, np.zeros(6)])), dtype=np.float64)[:9]
 
 
 def elbow_angle(p: Numbers) -> float:

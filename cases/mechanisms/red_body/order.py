@@ -83,8 +83,7 @@ class Fall:
         late = (p["speed_y"] + math.sqrt(max(p["speed_y"] ** 2 + 2.0 * p["gravity"] * high, 0.0))) / p["gravity"]
         if not self.gap(late) < 0.0:  # it has rolled over in the air
             return math.inf
-        root: float = brentq(self.gap, 0.0, late, xtol=1e-300, rtol=1e-15)
-        return root
+        return brentq(self.gap, 0.0, late, xtol=1e-300, rtol=1e-15)
 
     @cached_property
     def tilt(self) -> float:
@@ -130,8 +129,7 @@ class Fall:
             """dt/ds with th = tilt - s^2, which is smooth even where the turning starts from rest."""
             return -2.0 * s / self.turning(self.tilt - s * s)
 
-        time: float = quad(slowness, 0.0, math.sqrt(self.tilt), epsabs=0.0, epsrel=1e-12)[0]
-        return time
+        return quad(slowness, 0.0, math.sqrt(self.tilt), epsabs=0.0, epsrel=1e-12)[0]
 
     @cached_property
     def blow(self) -> float:

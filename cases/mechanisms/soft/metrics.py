@@ -27,8 +27,7 @@ def touch(side: str, run: Trajectory, case: Case) -> float | None:
 def imbalance(lam: Floats, case: Case) -> Floats:
     """Return lam_L - lam_R (n,) of multipliers (n, nc), N."""
     left, right = (lam[:, case.contacts.index(side)] for side in SIDES)
-    difference: Floats = left - right
-    return difference
+    return left - right
 
 
 def _coordinate(case: Case, name: str) -> int:
