@@ -16,8 +16,7 @@ import numpy as np
 from crossbody.cases import Inputs
 from crossbody.reference.kinds import Floats, Index
 
-Row = tuple[float, Floats, Floats]
-"""An instant, and t0 and a0 (na,) from there on."""
+Row = tuple[float, Floats, Floats]  # an instant, and t0 and a0 (na,) from there on
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

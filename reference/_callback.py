@@ -21,8 +21,7 @@ from crossbody.reference import kernels
 from crossbody.reference._activations import Live
 from crossbody.reference.kinds import Floats
 
-MEMORY = 1
-"""Length of the kernel's state: the address."""
+MEMORY = 1  # length of the kernel's state: the address
 _SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_double, *(ctypes.c_void_p,) * 3)
 
 

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any, Self
 
-LONG_S = 1e-3
-"""A slice as long as this makes it worth to note interrupts, which takes some 5 us, s."""
+LONG_S = 1e-3  # a slice as long as this makes it worth to note interrupts, which takes some 5 us, s
 
 
 class Interrupts:

@@ -21,8 +21,7 @@ from crossbody.reference._indices import different
 from crossbody.reference.kinds import Bytes, Floats, Index
 from crossbody.reference.systems import absent
 
-LARGEST = 1_000_000
-"""Of every size of a system."""
+LARGEST = 1_000_000  # of every size of a system
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)

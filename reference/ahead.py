@@ -24,8 +24,7 @@ PIECES = {
 
 BESIDE = ("integrator", "modes")
 """What every run needs beside the kernels of its mechanism; one after the other they share much of their code."""
-_alone = False
-"""Whether somebody else sees to the other pieces."""
+_alone = False  # whether somebody else sees to the other pieces
 
 
 @cache

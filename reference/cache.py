@@ -43,8 +43,7 @@ OURS = "crossbody.reference."
 ALLOCATES_NOTHING = ("crossbody.reference.core.", "crossbody.reference.sundials.compiled.")
 """The modules whose compiled functions make no arrays: numba refuses one that would."""
 
-FORMAT = "2"
-"""What `save_overload` writes; another number for every change of it."""
+FORMAT = "2"  # what `save_overload` writes; another number for every change of it
 
 
 def debugging() -> bool:

@@ -24,8 +24,7 @@ from crossbody.reference.delta.singularity import elbow_angle
 from crossbody.reference.delta.statics import closure_jacobian
 
 Numbers = Mapping[str, Any]
-STANDING = 1e-9
-"""Largest |h|, m, and |h'|, m/s, of a start that counts as closed."""
+STANDING = 1e-9  # largest |h|, m, and |h'|, m/s, of a start that counts as closed
 
 _OWN = ("r_base", "r_flange", "l1", "l2", "m1", "m2", "m3", "jm", "d1", "d2", "d3", "sign")
 

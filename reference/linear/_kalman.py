@@ -13,8 +13,7 @@ from crossbody.reference.linear._derivatives import residual
 from crossbody.reference.linear._point import STEP, Point, dense, terms
 from crossbody.reference.linear._unmeasured import Estimate, Record, input_columns
 
-TERMS, REACH = 12, 0.5
-"""Of the exponential's series: the rest of it is below 0.5^13/13! = 2e-14."""
+TERMS, REACH = 12, 0.5  # of the exponential's series: the rest of it is below 0.5^13/13! = 2e-14
 LOST = 1e-13
 """Part of the largest direction of a covariance below which it has none: what the rows hold does not vary."""
 

@@ -15,8 +15,7 @@ from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear.model import Complex, LinearModel
 
-RANK = 1e-9
-"""Part of the largest singular value below which a direction counts as none."""
+RANK = 1e-9  # part of the largest singular value below which a direction counts as none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

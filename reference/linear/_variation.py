@@ -24,8 +24,7 @@ from crossbody.reference.linear._emerging import accelerations_by_turns, by_turn
 from crossbody.reference.linear._point import STEP, Point, dense, directions, gaps, rubbing, terms
 from crossbody.reference.linear._rubbing import borne, loads
 
-HANDOVER = 0.01
-"""Elastic part of lam at which COLLISION becomes CONTACT (docs/explanation/model.md)."""
+HANDOVER = 0.01  # elastic part of lam at which COLLISION becomes CONTACT (docs/explanation/model.md)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,8 +33,7 @@ SOLID = -1
 DISCRETE, LATCHED = 4, 5
 
 OFF, CONTINUOUS, SAMPLED = range(3)
-BALANCE, SNATCH, CENTRE = range(1, 4)
-"""Modes of the controller beside OFF."""
+BALANCE, SNATCH, CENTRE = range(1, 4)  # modes of the controller beside OFF
 
 FACE_BELOW, TIPS_BELOW, FACE_ABOVE, TIPS_ABOVE, SLIP_BELOW, SLIP_ABOVE = 0, 1, 3, 4, 6, 7
 """Rows: tips stand in pairs, the clockwise end of the gap first."""

@@ -53,12 +53,9 @@ from crossbody.reference.systems._maze_layout import (
 
 INWARD, OUTWARD, EDGE_BELOW, EDGE_ABOVE, STRAYED = range(5)
 GUARDS = 5
-BAND = 1e-12
-"""Dead band: metres on a radius of a tenth, radians."""
-JUMPED = 1e-6
-"""Angle from an edge at which the ball did not come there by moving, rad."""
-STRAY = 0.5
-"""Cosine of the angle from the top beyond which the balance has no way back: 60 degrees."""
+BAND = 1e-12  # dead band: metres on a radius of a tenth, radians
+JUMPED = 1e-6  # angle from an edge at which the ball did not come there by moving, rad
+STRAY = 0.5  # cosine of the angle from the top beyond which the balance has no way back: 60 degrees
 FREE, CONTACT = 0, 1
 
 

@@ -63,8 +63,7 @@ if TYPE_CHECKING:
 
 SPHERE = 0.4
 """J/(m r^2) of a solid ball; its own, so that the closed forms, which have theirs, can disagree."""
-SCRATCH = 3
-"""Length of w: x/rho, y/rho, rho."""
+SCRATCH = 3  # length of w: x/rho, y/rho, rho
 
 
 @kernels.helper

@@ -30,8 +30,7 @@ PARAMETERS = (
 )  # fmt: skip
 """Order of the parameters: a is half_width, b half_height, d slab_half_height; SI units."""
 MASS, INERTIA, GRAVITY, WIDTH, HEIGHT, SLAB_MASS, SLAB_INERTIA, THICK, FOOT, WALL = np.arange(10)
-SPANS = ((3, 6), (3, 6), (0, 6), (0, 6), (0, 3))
-"""Coordinates that each row may touch."""
+SPANS = ((3, 6), (3, 6), (0, 6), (0, 6), (0, 3))  # coordinates that each row may touch
 
 
 @kernels.dynamics

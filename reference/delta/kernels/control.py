@@ -39,8 +39,7 @@ KNOT, TASK_TICK, JOINT_TICK = 28, 9, 6
 """Numbers a knot (t, Kp, Kd, Ki), and numbers a tick of a reference (r, r', r'') and (y_r, y_r')."""
 
 _COUNT, _INTEGRAL, _BEFORE, _X, _Y, _RATE, _TAU, _GAINS, _QUEUE = 0, 1, 4, 7, 13, 16, 19, 22, 49
-STATE = _QUEUE
-"""Length of s without the queue of 3 torques for each sample of delay."""
+STATE = _QUEUE  # length of s without the queue of 3 torques for each sample of delay
 
 _V = types.float64[::1]
 

@@ -20,8 +20,7 @@ from crossbody.reference.delta.kernels.linear import cross, dot
 from crossbody.reference.delta.kernels.solve import directions
 from crossbody.reference.kinds import Floats
 
-SINGULAR = 1e-9
-"""Below this |det D| (a product of unit vectors) the direct kinematics is singular."""
+SINGULAR = 1e-9  # below this |det D| (a product of unit vectors) the direct kinematics is singular
 NOT_CONVERGED, DIVIDED_BY_ZERO = -1, -2
 
 _V = types.float64[::1]

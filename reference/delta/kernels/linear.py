@@ -10,8 +10,7 @@ from typing import Any
 
 from crossbody.reference import kernels
 
-CONDITION = 1e10
-"""Above this condition of H M^-1 H^T (1-norm) the multipliers are ill posed."""
+CONDITION = 1e10  # above this condition of H M^-1 H^T (1-norm) the multipliers are ill posed
 _SUSPECT = 1e6
 
 

@@ -36,8 +36,7 @@ from crossbody.reference.kinds import Array, Floats, Index
 
 PARAMETERS = _arm.NAMES + _servo.NAMES
 SERVO_FROM, SERVO_TO, SIZE = _servo.FROM, _servo.TO, _servo.END
-SCRATCH = 18
-"""Length of w: the cosines and sines of the nine angles."""
+SCRATCH = 18  # length of w: the cosines and sines of the nine angles
 
 
 _THIRD = 1 / 3
