@@ -99,8 +99,3 @@ def contact_work(
     """
     potential = 0.5 * a0 * (h_out**2 - h_in**2) + 0.25 * a2 * (h_out**4 - h_in**4)
     return mass * (gravity * (h_out - h_in) - a1 * speed2 - potential)
-
-
-def contact_force(mass: float, gravity: float, a0: float, a1: float, a2: float, h: float, hd: float) -> float:
-    """Lam = m (g - a1 h' - a0 h - a2 h^3), N."""
-    return mass * (gravity - a1 * hd - a0 * h - a2 * h**3)

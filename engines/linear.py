@@ -84,10 +84,9 @@ class Chart:
         return replace(way, slope=self.slope(way.slope), explained=explained)
 
 
-def same(n: int, more: int = 0) -> Chart:
-    """The chart where the engine has the case's coordinates, and some more behind them."""
-    T = np.eye(n, n + more)
-    return Chart(T=T, S=T.T)
+def same(n: int) -> Chart:
+    """The chart where the engine has the case's coordinates."""
+    return Chart(T=np.eye(n), S=np.eye(n))
 
 
 def in_contact(case: Case) -> Case:

@@ -37,7 +37,7 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
     names = [actuator.name for actuator in scene.actuators]
     try:
         open_regular(path).close()
-        times, values = _from_npz(path, names) if path.suffix == ".npz" else _from_table(path, names)
+        times, values = _from_npz(path) if path.suffix == ".npz" else _from_table(path, names)
     except Exception as error:  # damaged, a table makes its library raise anything
         raise InvalidValue(f"Controls {path}: {str(error) or type(error).__name__}") from None
     if values.shape != (len(times), len(names)):
@@ -49,7 +49,7 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
     return Inputs(names=tuple(names), times=times, values=values)
 
 
-def _from_npz(path: Path, names: list[str]) -> tuple[Floats, Floats]:
+def _from_npz(path: Path) -> tuple[Floats, Floats]:
     with zipfile.ZipFile(path) as held:
         _check_size(sum(one.file_size for one in held.infolist()))
     with np.load(path, allow_pickle=False) as held:

@@ -125,15 +125,8 @@ def _constrained(native: Native) -> Callable[[Stand, Floats], tuple[Tangent, ...
     return ways
 
 
-def of_rows(rows: PinRows, spot: Spot, more: tuple[float, ...] = (), rates: tuple[float, ...] = ()) -> Stand:
-    """The stand of a mechanism of `PinRows`.
-
-    Args:
-        rows: the mechanism.
-        spot: the equilibrium.
-        more: coordinates of the model behind those of the case.
-        rates: their rates.
-    """
+def of_rows(rows: PinRows, spot: Spot) -> Stand:
+    """The stand of a mechanism of `PinRows` at an equilibrium."""
     on, zero = list(spot.rows), rows.tau.copy()
     a0, a1, a2 = rows.slow[:, on]
 
@@ -149,8 +142,7 @@ def of_rows(rows: PinRows, spot: Spot, more: tuple[float, ...] = (), rates: tupl
         return gamma
 
     return Stand(
-        model=rows.model, data=rows.data, q=np.append(spot.q, more), v=np.append(spot.v, rates),
-        chart=same(len(spot.q), len(more)), force=force,
+        model=rows.model, data=rows.data, q=spot.q, v=spot.v, chart=same(len(spot.q)), force=force,
         jacobian=lambda q: np.array(rows.jacobian(q)[on]), law=law,
     )  # fmt: skip
 

@@ -48,7 +48,6 @@ RESTS = 1e-12  # gap and rate, SI, at which a row rests at the start
 DIPS = 0.02
 """m: shapes further apart are not looked at for dips that begin and end in one step; a robot has
 hundreds of pairs, every one of which would have steps end where it is nearest."""
-Heights = Callable[[Floats], Floats]
 Gradients = tuple[Floats, Floats]  # h (n,) and H (n, nv)
 Placed = dict[str, tuple[int, Any]]  # body -> joint that carries it, and its pose in that joint's frame
 

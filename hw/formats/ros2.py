@@ -52,7 +52,7 @@ def check_bag(path: Path) -> None:
                 for _ in records(stream, path, budget):
                     pass
         elif file.suffix == ".zstd":
-            _check_unfolded(path, file, budget)
+            _check_unfolded(file, budget)
 
 
 def _check_metadata(path: Path, file: Path) -> None:
@@ -104,7 +104,7 @@ def _check_database(path: Path, file: Path) -> None:
         link.close()
 
 
-def _check_unfolded(path: Path, file: Path, budget: Budget) -> None:
+def _check_unfolded(file: Path, budget: Budget) -> None:
     """Unfold a compressed file once to see how large it is: the library writes it to the disk whole."""
     import zstandard
 

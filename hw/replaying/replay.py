@@ -102,7 +102,7 @@ def _predict(
     used: dict[str, Any] = {}
     for window in cut:
         if kind == "closed_loop":
-            run, used = _looped(model, numbers, window, name, profile)
+            run, used = _looped(model, numbers, window, name)
         else:
             run, used = run_window(model, numbers, window, name, profile, settings)
         runs.append((run, *_seen(model, run, window)))
@@ -116,9 +116,7 @@ def _predict(
     )  # fmt: skip
 
 
-def _looped(
-    model: Model, numbers: Mapping[str, Value], window: Window, name: str, profile: str
-) -> tuple[Trajectory, dict[str, Any]]:
+def _looped(model: Model, numbers: Mapping[str, Value], window: Window, name: str) -> tuple[Trajectory, dict[str, Any]]:
     if name != "reference":
         raise CaseUnsupported(f"{name} follows the paths of a case alone; a recorded reference is the reference's.")
     assert model.loop is not None  # checked by the caller

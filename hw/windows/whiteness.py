@@ -166,14 +166,14 @@ def products(x: Floats, y: Floats, lags: NDArray[np.int64]) -> Floats:
     return np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)[lags]
 
 
-def _whitener(pieces: Sequence[Floats], order: int = ORDER) -> Floats:
+def _whitener(pieces: Sequence[Floats]) -> Floats:
     """Taps of 1 - sum a_k z^-k."""
     mean = float(np.mean(np.concatenate(pieces)))
-    rows, now = [np.zeros((0, order))], [np.zeros(0)]
+    rows, now = [np.zeros((0, ORDER))], [np.zeros(0)]
     for u in pieces:
         centred = u - mean
-        if len(u) > order:
-            rows.append(np.column_stack([centred[order - k - 1 : len(u) - k - 1] for k in range(order)]))
-            now.append(centred[order:])
+        if len(u) > ORDER:
+            rows.append(np.column_stack([centred[ORDER - k - 1 : len(u) - k - 1] for k in range(ORDER)]))
+            now.append(centred[ORDER:])
     solution = np.linalg.lstsq(np.concatenate(rows), np.concatenate(now), rcond=1e-10)[0]
     return np.concatenate(([1.0], -solution))

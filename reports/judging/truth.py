@@ -18,7 +18,7 @@ from crossbody.reference import ahead
 from crossbody.reports.judging.answers import Answers
 from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, motion, tight
 from crossbody.reports.measuring.alignment import matched
-from crossbody.reports.measuring.equations import violated
+from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, before, sample_times, shortened
 

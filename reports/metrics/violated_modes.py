@@ -6,7 +6,7 @@ Looked for on a fine grid between the run's rows, by the equations and not by th
 from __future__ import annotations
 
 from crossbody.cases import Case, Trajectory
-from crossbody.reports.measuring.equations import violated
+from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"

@@ -132,10 +132,9 @@ def policy(scripts: Sequence[str], single: bool) -> str:
     )
 
 
-def assets(pages_drawn: bool) -> dict[str, str]:
+def assets() -> dict[str, str]:
     """The files that all pages of a folder share, by name."""
-    shared = {SCRIPT: _script(), STYLE: _text("page.css")}
-    return shared | ({PLOTLY: _text(PLOTLY)} if pages_drawn else {})
+    return {SCRIPT: _script(), STYLE: _text("page.css"), PLOTLY: _text(PLOTLY)}
 
 
 @cache

@@ -58,15 +58,11 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
     if output.is_staged(out):
         _make(out, single_file, against, others)
         return out / PAGE
-    _ours(out)
+    if not output.is_ours(out):
+        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
     with output.folder(out, "report", adds=True) as made:
         _make(made, single_file, against, others)
     return out / PAGE
-
-
-def _ours(out: Path) -> None:
-    if not output.is_ours(out):
-        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
 
 
 def _make(made: Path, single_file: bool, against: Path | None, others: Sequence[Path]) -> None:
@@ -80,7 +76,7 @@ def _make(made: Path, single_file: bool, against: Path | None, others: Sequence[
     except OutputError as error:  # the hidden folder is nobody's business
         raise OutputError(str(error).replace(str(made), str(out))) from error
     if not single_file:
-        _put(made, assets(pages_drawn=True))
+        _put(made, assets())
 
 
 _BROKEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError, TemplateError)
@@ -114,23 +110,6 @@ def _unreadable(found: Results, error: BaseException) -> str:
     files = ", ".join(name for name in output.tables(found.out))
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return f"{found.out} cannot be shown: a field of {files} or of a motion is not as expected ({what})."
-
-
-def write_page(out: Path, name: str, title: str, sections: Sequence[Section], lead: str = "") -> Path:
-    """Make one page of given sections in a folder of ours; links lead to the index beside it.
-
-    For a study whose page is to be made again by `crossbody report`, add a module to
-    crossbody.reports.sections instead: `write` finds it.
-
-    Raises:
-        OutputError: if the folder is not ours, or cannot be written.
-    """
-    _ours(out)
-    page = Page(name=name, title=title, sections=sections, lead=lead)
-    links = (Link(page=INDEX, title="Index"), Link(page=name, title=title))
-    with output.folder(out, "report", adds=True) as made:
-        _put(made, {f"{name}.html": render([page], links, "")} | assets(pages_drawn=True))
-    return out / f"{name}.html"
 
 
 def _put(out: Path, files: dict[str, str]) -> None:

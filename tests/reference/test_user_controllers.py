@@ -35,7 +35,7 @@ from crossbody.reference.tree.system import system
 from crossbody.reports.bench.ladder import Ladder
 from crossbody.reports.bench.measure import Effort, bench
 from crossbody.reports.cli import cli
-from crossbody.reports.measuring.equations import violated
+from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.truth import from_run
 from crossbody.reports.metrics import load as metric
 from crossbody.reports.runs.choice import Pick

@@ -13,7 +13,7 @@ from crossbody.cases import Case, Mode, Tier
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.engines.pinocchio._joined import none_pulling
 from crossbody.reports import metrics
-from crossbody.reports.measuring.equations import violated
+from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.truth import from_run
 
 RTOL = 1e-9

@@ -85,8 +85,7 @@ def creep(mu: float, slope: float, press: float, soft: Soft, *, elliptic: bool) 
     return rest * (2.0 * rho if rho <= 0.5 else (3.0 * rho - 1.0) / (1.0 - rho)) / (soft.damping * mu)
 
 
-STICTION, HOLDS, SIGMA = 1e-3, 1e-6, 1e-3
-"""Drake's stiction tolerance, m/s, and that of its profile matched; SAP's relative regularisation of friction."""
+STICTION, HOLDS = 1e-3, 1e-6  # Drake's stiction tolerance, m/s, and that of its profile matched
 CFM, STEP = 1e-5, 1e-3  # DART's constraint force mixing, and the step of both engines, s
 
 
@@ -105,8 +104,3 @@ def regularised(rho: float) -> dict[tuple[str, str], float]:
 def mixed(pull: float, step: float = STEP) -> float:
     """Return the creep of DART, m/s, from the tangential acceleration, m/s^2, and the step, s."""
     return CFM * pull * step
-
-
-def near_rigid(pull: float, step: float = STEP) -> float:
-    """Return the creep of a point mass with Drake's SAP where contacts are near rigid, m/s; see `mixed`."""
-    return SIGMA * pull * step / math.sqrt(3.0)

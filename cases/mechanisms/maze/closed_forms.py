@@ -52,8 +52,3 @@ def centre_gains(g: float, rho: float, p: float) -> tuple[float, float, float]:
     """(k2, k1, k0) of (s^2 + w0 s + w0^2)(s + p), w0 the frequency of the ball that rolls to the bottom."""
     w0 = pole(g, rho, 1.0 + INERTIA)
     return w0 + p, w0 * w0 + p * w0, p * w0 * w0
-
-
-def rebound_limit(g: float, clearance: float, speed: float) -> float:
-    """Restitution up to which a ball that lands at `speed` does not hit the ring above: sqrt(2 g clearance)/speed."""
-    return math.sqrt(2.0 * g * clearance) / speed
