@@ -91,7 +91,7 @@ __all__ = [
 
 
 def _warn_of_another_checkout() -> None:
-    """Say so where a folder called crossbody beside the script came before what is installed from elsewhere."""
+    """Say so where a folder called crossbody beside the script came before what is installed."""
     here, whole = Path(__file__).parents[1], sys.modules["crossbody"]
     if whole.__file__ or not any(Path(place).resolve() == here.resolve() for place in whole.__path__):
         return  # a regular package comes before such a folder

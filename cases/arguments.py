@@ -1,4 +1,4 @@
-"""Arguments of the entry points: what has the wrong type is told in a sentence, not in a traceback from inside."""
+"""Arguments of the entry points: a wrong type is told in a sentence, not in a traceback from inside."""
 
 from __future__ import annotations
 

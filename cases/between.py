@@ -45,7 +45,7 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
 
 
 def multipliers(run: Trajectory) -> Floats | None:
-    """Lam (m, nc) at the samples and between them, by splines that never cross an event; None if lam is not known."""
+    """Lam (m, nc) at the samples and between them, by splines within events; None if lam is not known."""
     if np.isnan(run.lam).any():
         return None
     cuts = np.linspace(0.0, 1.0, PARTS, endpoint=False)

@@ -387,7 +387,7 @@ class Case:
         object.__setattr__(self, "metrics", MappingProxyType(dict(self.metrics)))
 
     def _put_control(self) -> None:
-        """Tell a controller its inputs, and bring its ticks to the horizon and to the instants of the other inputs."""
+        """Tell a controller its inputs; bring its ticks to the horizon and to instants of other inputs."""
         control, scene, inputs = self.control, self.scene, self.inputs
         if control is None:
             return
@@ -403,7 +403,7 @@ class Case:
 
     @property
     def general(self) -> bool:
-        """Whether its equations are those of every scene: a robot's file, or a scene without kernels of its own."""
+        """Whether its equations are those of every scene: a robot's file, a scene without own kernels."""
         return self.mechanism == "scene"
 
     @property

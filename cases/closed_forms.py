@@ -35,7 +35,7 @@ def half_angle(zeta: float) -> float:
 
 
 def restitution(zeta: float) -> float:
-    """E = exp(-2 zeta Th(zeta)): 1 without damping, 1/e^2 for a double pole, about 1/(4 zeta^2) for a strong damper."""
+    """E = exp(-2 zeta Th(zeta)): 1 undamped, 1/e^2 at a double pole, some 1/(4 zeta^2) for strong damping."""
     return 0.0 if math.isinf(zeta) else math.exp(-2.0 * zeta * half_angle(zeta))
 
 

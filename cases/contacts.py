@@ -12,7 +12,7 @@ from crossbody.cases.trajectory import Event, Mode, Trajectory
 
 CLOSED = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
 AT_REST = 1e-10
-"""Gap, m or rad (relative to positions above 1), within which a row is at its surface: what errors make of it."""
+"""Gap, m or rad (relative to positions above 1), within which a row is at its surface, by errors."""
 LIGHT = 1e-12  # multiplier, N or N m (relative to the largest above 1), that rounding makes of none
 
 

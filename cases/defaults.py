@@ -45,7 +45,7 @@ _FRICTION = tuple(
 
 
 def default_limits(case: Case) -> tuple[Limit, ...]:
-    """Limits on position, velocity, force, energy, events and drift, as far as the case's rows have such numbers."""
+    """Limits on position, velocity, force, energy, events and drift, where the case's rows have such."""
     everyone = tuple(Limit(metric=metric, value=value, why=why) for metric, value, why in _defaults(case))
     everyone += _FRICTION if case.rubs else ()
     if not case.law.unilateral.any():
@@ -90,5 +90,5 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
 
 
 def limits_of(case: Case) -> tuple[Limit, ...]:
-    """The limits of a case in full: its own behind the defaults, so that of equally precise ones its own speak."""
+    """The limits of a case in full: its own behind the defaults, so that of equals its own speak."""
     return (*default_limits(case), *case.limits)

@@ -63,7 +63,7 @@ class SceneError(CrossbodyError, ValueError):
 
 
 class ControlError(CrossbodyError, ValueError):
-    """A controller of the user's own that raises, or gives something else than its controls; it names tick and time."""
+    """A controller of the user's own that raises, or gives no controls; it names tick and time."""
 
 
 class EngineUnavailable(CrossbodyError):  # noqa: N818

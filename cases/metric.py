@@ -1,4 +1,4 @@
-"""A number that the runs of one mechanism show, beside those that every case has (`crossbody.reports.metrics`)."""
+"""A number that one mechanism's runs show, beside those of every case (`crossbody.reports.metrics`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters of other kinds than one number or one word: a list of numbers, a number that a word may stand for."""
+"""Parameters of other kinds than one number or one word: lists of numbers, a number or a word for it."""
 
 from __future__ import annotations
 

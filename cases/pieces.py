@@ -25,7 +25,7 @@ CROSSINGS = 3
 
 
 def period(t: Floats, x: Floats) -> float | None:
-    """Return the mean time between upward crossings of x(t) = 0, s; None if there are fewer than `CROSSINGS`."""
+    """Return the mean time between upward crossings of x(t) = 0, s; None below `CROSSINGS` of them."""
     i = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
     if len(i) < CROSSINGS:
         return None

@@ -59,7 +59,7 @@ class Registry:
         return importlib.import_module(module)
 
     def summary(self, name: str) -> str:
-        """Return the first line of a plug-in's docstring without importing it; of an installed one where it is from."""
+        """Return a plug-in's first line without importing it; of an installed one its origin."""
         spec = PathFinder.find_spec(f"{self.package}.{name}", self._path())
         if spec is None or spec.origin is None:
             module = self._installed().get(name, "")

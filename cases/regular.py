@@ -1,4 +1,4 @@
-"""Files that somebody else may have put there, opened without ever waiting for a writer that does not come."""
+"""Files that somebody else may have put there, opened without waiting for a writer that never comes."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def normalised(q: Floats, quaternions: Sequence[int]) -> Floats:
 
 
 def turned(q: Floats, rest: Floats) -> Floats:
-    """Return the rotation vectors (..., 3), rad, in body axes, that lead from quaternions `rest` to q (..., 4)."""
+    """Return the rotation vectors (..., 3), rad, in body axes, from quaternions `rest` to q (..., 4)."""
     a, b = rest[..., :1], -rest[..., 1:]
     e, f = q[..., :1], q[..., 1:]
     w, x = a * e - np.sum(b * f, axis=-1, keepdims=True), a * f + e * b + np.cross(b, f)
@@ -35,7 +35,7 @@ def turned(q: Floats, rest: Floats) -> Floats:
 
 
 def rates(q: Floats, v: Floats, quaternions: Sequence[int]) -> Floats:
-    """Return q' (n, nq) of velocities (n, nv), which for a quaternion are the angular ones in body axes, rad/s."""
+    """Return q' (n, nq) of velocities (n, nv), for a quaternion the angular ones in body axes, rad/s."""
     parts, at, row = [], 0, 0
     for first in quaternions:
         parts.append(v[:, row : row + first - at])

@@ -35,7 +35,7 @@ FLAT = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RowLaw:
-    """Constants of h'' + a1 h' + a0 h + a2 h^3 = 0 for one row; b0, b1 those of COLLISION, 0 where there is one set."""
+    """Constants of h'' + a1 h' + a0 h + a2 h^3 = 0 for one row; b0, b1 of COLLISION, 0 without."""
 
     a0: float
     a1: float
@@ -459,7 +459,7 @@ class Scene:
     friction: bool = True
 
     def __post_init__(self) -> None:
-        """Check that names are unique, that every name which is spoken of is there, and the order of the parts."""
+        """Check that names are unique, that every name used is there, and the parts' order."""
         object.__setattr__(self, "gravity", _vector("Scene.gravity", self.gravity, 3))
         for group in ("bodies", "joints", "shapes", "pairs", "loops", "tendons", "actuators", "pushes"):
             object.__setattr__(self, group, tuple(getattr(self, group)))
@@ -523,7 +523,7 @@ class Scene:
 
     @property
     def dry(self) -> tuple[tuple[Joint | Tendon, int], ...]:
-        """What has dry friction of its own, and along how many velocities each, in the order of their rows."""
+        """What has dry friction of its own, and along how many velocities, in the rows' order."""
         found = [(joint, WIDTHS[joint.type][1]) for joint in self.joints if joint.friction_loss > 0.0]
         return (*found, *((tendon, 1) for tendon in self.tendons if tendon.friction_loss > 0.0))
 

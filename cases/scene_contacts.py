@@ -57,7 +57,7 @@ class Contact:
 
     @property
     def parallel(self) -> float:
-        """Sine of the angle below which capsules lie along each other, or a cylinder stands; 0 of other shapes."""
+        """Sine of the angle below which capsules lie along each other, or a cylinder stands; else 0."""
         return parallel(self.first, self.second)
 
     @property
@@ -72,7 +72,7 @@ class Contact:
 
     @property
     def tangents(self) -> tuple[str, ...]:
-        """Names of its tangential rows, two for every normal one; they stand behind the normal rows of all contacts."""
+        """Names of its tangential rows, two for every normal one, behind all normal rows."""
         return tuple(f"{name} {way}" for name in self.normals for way in WAYS) if self.friction > 0.0 else ()
 
     @property
@@ -294,7 +294,7 @@ def check_pairs(scene: Scene) -> None:
 
 
 def unknown_friction(scene: Scene, pair: Pair) -> str:
-    """Return why the machine does not know the friction of a pair; empty if it has none or slides alike all ways."""
+    """Return why the machine does not know the friction of a pair; empty if it knows it."""
     if pair.dimension == 1:
         return ""
     if pair.dimension != 3:
@@ -308,7 +308,7 @@ def unknown_friction(scene: Scene, pair: Pair) -> str:
 
 
 def _places(one: Shape, two: Shape) -> int:
-    """Return at how many places two shapes may meet; 0 where no gap is known, or at more than rows are made for."""
+    """Return at how many places two shapes may meet; 0 where no gap is known, or too many."""
     most = PLACES.get((one.type, two.type), 0)
     if two.type != "hull":
         return most

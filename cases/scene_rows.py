@@ -1,4 +1,4 @@
-"""The rows of a scene in the order of all engines: loops, bounds, contacts, dry friction of joints and tendons."""
+"""The rows of a scene in the order of all engines: loops, bounds, contacts, dry friction."""
 
 from __future__ import annotations
 

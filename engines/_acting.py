@@ -1,4 +1,4 @@
-"""What acts on a scene from outside in a run: recorded inputs, and on top of them a controller of the user's own."""
+"""What acts on a scene from outside in a run: recorded inputs, and a controller of the user's on top."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ one step and over two part where there is a kink in between; where there is none
 ONE_SIDED = np.array([[-25.0 / 12.0, 4.0, -3.0, 4.0 / 3.0, -0.25], [1.0, -4.0, 6.0, -4.0, 1.0]])
 """Slope at the first of five points, and what is none of a cubic through them."""
 TOGETHER = 64
-"""Recorded states whose gaps are computed at once: some hundred pairs are as many arrays as memory's cache holds."""
+"""Recorded states whose gaps are computed at once: hundreds of pairs fill the memory's cache."""
 KEPT = 256  # sets of rows whose numbers are kept
 MOVES = np.array([
     [0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0],
@@ -282,7 +282,7 @@ class Contacts:
         )  # fmt: skip
 
     def _sizes(self, shapes: Indices) -> Floats:
-        """Return the extents of shapes of one type; a hull's last corner stands for those that others have more."""
+        """Return the extents of shapes of one type; a hull's last corner stands in for those it lacks."""
         found = [self._extents[i] for i in shapes]
         if found[0].ndim == 1:
             return np.array(found)
@@ -395,7 +395,7 @@ def _along(contact: Contact, at: Pose, by: Pose) -> bool:
 
 
 def end_of(contact: Contact, at: Pose, by: Pose, point: Floats) -> int:
-    """Return at which of two capsules' places, or of a cylinder's over a plane, a point is where they meet."""
+    """Return at which place of two capsules, or of a cylinder over a plane, a point is where they meet."""
     if contact.first.type == "plane":
         x, n = by[0].T @ (point - by[1]), by[0].T @ at[0][:, 2]
         if _along(contact, at, by):

@@ -87,7 +87,7 @@ class Gated:
         return [Switch(t=t, variable=i, before=b, after=a) for i, (b, a) in pairs if a != b]
 
     def begin(self, q: Floats) -> None:
-        """Forget what was, and find the discrete variables of a motion that starts at q, where nothing touches."""
+        """Forget what was, and find the discrete variables of a start at q, where nothing touches."""
         self.numbers[:], self.lost = self.gates.numbers, False
         self.kept.clear()
         self._apply(q, (0,) * self.nc, START)
@@ -97,7 +97,7 @@ class Gated:
         self._guards(q, self.numbers, out)
 
     def through(self, _fired: frozenset[int]) -> bool:
-        """Whether a step went through something that lies on neither side of it: these are located where they are."""
+        """Whether a step went through something that lies on neither side of it: these are located there."""
         return False
 
     def turn(self, q: Floats, modes: Modes, fired: frozenset[int]) -> Modes:

@@ -38,7 +38,7 @@ UNMET = 1e-6
 depends on others that contradict it, as of a sphere within another: no multipliers let both
 follow their laws, and it would have to pull."""
 UNMOVED = 1e-24
-"""Of the largest diagonal entry of H M^-1 H^T: the rate of a row which no motion moves is rounding, and has no dips."""
+"""Of the largest diagonal entry of H M^-1 H^T: the rate of a row that nothing moves is rounding."""
 
 
 @dataclass(slots=True)
@@ -93,7 +93,7 @@ class LevelMachine:
         self._order: dict[Modes, tuple[NDArray[np.intp], list[int]]] = {}
 
     def watch(self, q: Floats, v: Floats, modes: Modes, out: NDArray[Any]) -> None:
-        """FREE: h and h' (whose zero is where a dip is deepest); active: lam; BALLISTIC: -h, and the catch."""
+        """FREE: h and h' (zero where a dip is deepest); active: lam; BALLISTIC: -h, and the catch."""
         rows = self.rows
         h, hd = rows.gaps(q, v)
         free, others = self._sorted(modes)
@@ -116,7 +116,7 @@ class LevelMachine:
                 out[at + PUSH] = max(hd[i] + self.slow, -pressure[i])
 
     def _sorted(self, modes: Modes) -> tuple[NDArray[np.intp], list[int]]:
-        """The rows that a machine decides about: those that are free, and the others; found once for a set of modes."""
+        """The rows that a machine decides about: free ones, and others; found once a set of modes."""
         if modes not in self._order:
             free = [i for i in self.own if modes[i] == FREE]
             self._order[modes] = np.array(free, dtype=np.intp), [i for i in self.own if modes[i] != FREE]

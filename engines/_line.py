@@ -23,7 +23,7 @@ from crossbody.engines._real_time import in_real_time, one_set
 FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
 
 ROUNDED = 64.0 * float(np.finfo(np.float64).eps)
-"""Part of the length of a scene that rounding of its places makes of a gap that is zero, and of how it moves."""
+"""Part of the length of a scene that rounding of its places makes of a zero gap, and of its motion."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,7 +92,7 @@ class Line:
 
     @cached_property
     def _rounding(self) -> float:
-        """Gap that no engine tells from zero, m: shapes that touch there may be apart, or overlap and push, by it."""
+        """Gap that no engine tells from zero, m: touching shapes may be apart, or push, by it."""
         return ROUNDED * float(np.abs(self.places).max() + np.abs(self.h0).max(initial=0.0))
 
     def gaps(self, q: Floats) -> Floats:
@@ -113,7 +113,7 @@ class Line:
         return (self.masses * change) @ self._balance.T
 
     def memoryless(self, q: Floats, v: Floats, h: Floats | None = None) -> Floats:
-        """max(0, lam) of every row whose gap h, of q if not given, is closed, lam where it cannot open (..., nc), N."""
+        """max(0, lam) of rows whose gap h, of q if not given, is closed, lam if always on (..., nc), N."""
         lam = self.spring(q, v)
         closed = np.where((self.gaps(q) if h is None else h) <= 0.0, np.maximum(lam, 0.0), 0.0)
         return np.where(self.unilateral, closed, lam)

@@ -63,7 +63,7 @@ class Rows(Protocol):
 
 
 def elastic_part(fast: Floats, h: Floats, hd: Floats) -> Floats:
-    """What a COLLISION holds elastically (nc,), m/s^2, by b0 and b1 of every row (2, nc); see `Rows.elastic`."""
+    """What a COLLISION holds elastically (nc,), m/s^2, by b0 and b1 (2, nc); see `Rows.elastic`."""
     b0, b1 = fast
     part: Floats = np.maximum(b1, np.sqrt(b0)) * np.abs(hd) + b0 * np.abs(h)
     return part
@@ -103,7 +103,7 @@ class Machine(Protocol):
         ...
 
     def settle(self, q: Floats, v: Floats, modes: Modes, fired: Fired = ...) -> Settled:
-        """Switch until nothing changes (event iteration). `fired` says which guards hold though round-off hides it."""
+        """Switch until nothing changes (event iteration). `fired` guards hold though round-off hides it."""
         ...
 
 

@@ -59,7 +59,7 @@ HIDDEN: Mapping[str, Mapping[str, str]] = {
 
 
 def why_beside(engine: str, case: Case) -> str | None:
-    """Return why an engine that builds a scene's own parts cannot run a case; None if these are all that it has."""
+    """Return why an engine that builds a scene's own parts cannot run a case; None if it has but these."""
     more = {"forces": case.force, "rows and gates": case.gates, "a scene in other coordinates": case.form}
     found = [name for name, part in more.items() if part is not None]
     return f"{engine} builds the parts of a scene alone, and {case.label} has {found[0]} beside." if found else None
@@ -118,7 +118,7 @@ def _gaps_there(line: Line, q: Floats, v: Floats, rows: list[int]) -> Floats:
 def _crossings(
     line: Line, t: Floats, q: Floats, v: Floats
 ) -> tuple[list[int], tuple[Floats, Floats, Floats], list[int]]:
-    """Before which samples a gap passes zero, or below it what would push; t, q, v there, and the rows, in order."""
+    """Before which samples a gap, or below it what would push, passes zero; t, q, v, rows, in order."""
     h, lam = line.gaps(q), line.spring(q, v)
     found = [_touch(line, t, q, v, i, row) for i, row in np.argwhere(h[1:] * h[:-1] < 0.0)]
     below = (h[1:] < 0.0) & (h[:-1] < 0.0) & (lam[1:] * lam[:-1] < 0.0) & line.unilateral

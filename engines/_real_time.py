@@ -10,7 +10,7 @@ from crossbody.cases import Case, Law
 
 
 def one_set(law: Law) -> Law:
-    """Return the constants of a row just entered as its only ones: those of COLLISION where it has two sets."""
+    """Return the constants of a row just entered as its only: those of COLLISION where it has two sets."""
     quick = law.b0 > 0.0
     return Law(
         a0=np.where(quick, law.b0, law.a0), a1=np.where(quick, law.b1, law.a1),

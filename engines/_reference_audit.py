@@ -12,7 +12,7 @@ from crossbody.engines._scene import masses
 from crossbody.reference import System
 
 DEPENDENT = 1e6
-"""Condition of H M^-1 H^T beyond which rounding of the rows alone parts two engines' multipliers by more than 1e-9."""
+"""Condition of H M^-1 H^T beyond which rounding parts two engines' multipliers by over 1e-9."""
 
 
 def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:

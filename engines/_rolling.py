@@ -21,7 +21,7 @@ TILTED = 1  # value of the variable that says how a cylinder is, off its caps
 
 
 def determined(scene: Scene, run: Trajectory) -> Trajectory:
-    """Return the run, or one that is ill posed from the instant on at which a cylinder rolled through no tilt."""
+    """Return the run, or one that is ill posed from where a cylinder rolled through no tilt."""
     told = [_rolled(run, variable, row, name) for variable, row, name in _cylinders(scene, run.gap.shape[1])]
     first = min(filter(None, told), default=None)
     if first is None or not run.outcome.ok:

@@ -111,14 +111,14 @@ class Stepper(Protocol):
         """Return rotation (3, 3) and position (3,) of a body, m."""
 
     def observe(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Return the gaps of bounds and contacts (n, m), and energies (n, 2), of recorded states of the scene."""
+        """Return the gaps of bounds and contacts (n, m), and energies (n, 2), of recorded states."""
 
     def counts(self) -> Mapping[str, int]:
         """Return what the engine counts."""
 
 
 def why_no_steps(engine: str, scene: Scene, bounds: bool = False) -> str | None:
-    """Return why an engine that steps contacts, perhaps bounds, cannot run a scene with friction; None if it can."""
+    """Return why an engine that steps contacts, perhaps bounds, runs no scene with friction; or None."""
     if dry := next((part for part, _ in scene.dry), None):
         return f"{engine} steps contacts alone, and {dry.name!r} has dry friction (friction_loss, without=friction)."
     if scene.loops:

@@ -57,7 +57,7 @@ def horner(c: Vector, x: float) -> float:
 
 
 def module_of(case: Case) -> str:
-    """Return the module of an engine that builds a case's model: that of all scenes, where the case is one."""
+    """Return the module of an engine that builds a case's model: that of all scenes for one."""
     return "scene" if case.scene is not None else case.mechanism
 
 
@@ -176,7 +176,7 @@ class Forces:
         self.still()
 
     def _lay_out_bounds(self) -> None:
-        """Write the gap of every bound as sign x + offset, x one of the joints' coordinates and tendons' lengths."""
+        """Write the gap of every bound as sign x + offset, x a joint's coordinate or a tendon's length."""
         joints = self.scene.joints
         self.firsts = np.array([self.place[joint.name] for joint in joints], dtype=int)
         self.balls = [(i, self.at[joint.name]) for i, joint in enumerate(joints) if joint.type == "ball"]
@@ -316,7 +316,7 @@ class Forces:
         return lengths, A @ v, A
 
     def bounds(self, q: Floats, lengths: Floats) -> Floats:
-        """Return the gaps (..., n) of all bounds, in the order of their rows; lengths (..., nt) are of the tendons."""
+        """Return the gaps (..., n) of all bounds, in their rows' order; lengths (..., nt) of the tendons."""
         if self.plain is not None:
             plain: Floats = self.bound_sign * q[..., self.plain] + self.bound_at
             return plain
@@ -332,7 +332,7 @@ class Forces:
         return out
 
     def actuated(self, x: Floats, v: Floats, stretch: Stretch | None = None) -> Floats:
-        """Return what the actuators do (nv,), each within its bounds and their sum within the joint's; less damping."""
+        """Return what the actuators do (nv,), each in its bounds, their sum in the joint's; less damping."""
         lengths, rates, A = self.strokes(x, v, stretch)
         (g0, g1, g2), (b0, b1, b2) = self.gain, self.bias
         force = (g0 + g1 * lengths + g2 * rates) * self.driven() + b0 + b1 * lengths + b2 * rates
@@ -379,7 +379,7 @@ class Rows:
         self.bends = bool(self.curved or self.balls)
 
     def _straighten(self) -> None:
-        """Lay out the rows, less bounds of distances of points; 0 of what bends, of a ball joint its angle's offset."""
+        """Lay out the rows but bounds of distances; 0 of what bends, a ball joint's angle's offset."""
         forces, turning, count = self.forces, dict(self.forces.balls), len(self.ends)
         spanning = np.array(forces.spanning, dtype=int) + len(self.scene.joints)
         taken = ~np.isin(forces.bound_of, spanning)
@@ -432,7 +432,7 @@ class Rows:
         return angle, row, bend
 
     def _end(self, kind: str, name: str) -> tuple[Floats, float]:
-        """Return the derivative (nv,) of a coordinate or a length, zero without a name, and what it is at rest."""
+        """Return the derivative (nv,) of a coordinate or a length, zero without a name, and its rest."""
         if not name:
             return np.zeros(self.forces.nv), 0.0
         if kind == "tendon":

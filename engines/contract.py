@@ -53,7 +53,7 @@ class Run(ABC):
         """
 
     def native(self) -> float:
-        """Return the time in which the engine's own loop makes the same steps without what is Python, s; NaN: none."""
+        """Return the engine's own loop's time for the same steps without Python, s; NaN: none."""
         return math.nan
 
 
@@ -104,7 +104,7 @@ class Engine(ABC):
         """
 
     def planned(self, case: Case, profile: str = "matched", **settings: Any) -> Mapping[str, Any]:
-        """Return the settings that a run would have; an engine that compiles to prepare one overrides this."""
+        """Return the settings that a run would have; an engine that compiles for one overrides this."""
         return self.prepare(case, profile, **settings).settings
 
     def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:

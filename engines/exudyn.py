@@ -52,7 +52,7 @@ class Model:
 
 
 def _law(scene: Line, row: int) -> Law:
-    """Force of a connector: its lam with the sign of Exudyn, which pulls the right body towards the left one."""
+    """Force of a connector: its lam with the sign of Exudyn, which pulls the right body to the left."""
     m, w = float(scene.reduced[row]), float(scene.presses[row])
     a0, a1, a2 = (float(a[row]) for a in (scene.a0, scene.a1, scene.a2))
     opens, zero = bool(scene.unilateral[row]), exu.symbolic.Real(0.0)

@@ -16,7 +16,7 @@ from crossbody.cases.scene_contacts import STEEPEST
 
 Pose = tuple[Floats, Floats]  # rotations (..., 3, 3) and positions (..., 3) in the world
 Places = tuple[Floats, Floats, Floats]
-"""Gaps (..., places), m; unit normals from the first shape to the second, and points of the second (..., places, 3)."""
+"""Gaps (..., places), m; unit normals towards the second shape, and its points (..., places, 3)."""
 Pair = tuple[Floats, Floats]  # points of the first of two shapes, and those of the second (..., 3)
 Truths = NDArray[np.bool_]
 SIGNS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in range(8)])
@@ -103,7 +103,7 @@ def aslant(at: Pose, by: Pose) -> Floats:
 
 
 def crossing(at: Pose, by: Pose) -> Floats:
-    """Return the sine of the angle at which axes of two capsules cross, seen along what is nearest between them."""
+    """Return the sine of the angle at which axes of two capsules cross, seen along their nearest line."""
     A, B, way = _axes(at, by)
     apart = way - _dot(A, way)[..., None] * A
     across, length = cross(A, B), np.sqrt(_dot(apart, apart))
@@ -233,7 +233,7 @@ def _axes(one: Pose, two: Pose) -> tuple[Floats, Floats, Floats]:
 
 
 def _feet(one: Pose, half: Floats, two: Pose, other: Floats) -> Pair:
-    """Return the ends of segments and what is nearest to each on the other (..., 4, 3): of the first, of the second."""
+    """Return segments' ends and what is nearest on the other (..., 4, 3): of the first, of the second."""
     return _joined(_foot(one, half, two, other), _foot(two, other, one, half)[::-1])
 
 
@@ -247,7 +247,7 @@ def _end(one: Pose, half: Floats, two: Pose, other: Floats, sign: float, feet: P
 
 
 def _nearest(one: Pose, half: Floats, two: Pose, other: Floats, feet: Pair) -> Pair:
-    """Return the nearest points (..., 3) of segments: the best of the four ends and the common perpendicular."""
+    """Return the nearest points (..., 3) of segments: the best of four ends and the perpendicular."""
     A, B, way = _axes(one, two)
     across = cross(A, B)
     square = _dot(across, across)

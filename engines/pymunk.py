@@ -25,7 +25,7 @@ USUAL = 1.0 / 60.0  # s, the step of pymunk's own examples
 
 
 class World:
-    """A `Stepper`: bodies that do not turn in the plane x, z, with their shapes, beside those of the world."""
+    """A `Stepper`: bodies that do not turn in the plane x, z, with their shapes and the world's."""
 
     def __init__(self, scene: Line, e: float, matched: bool) -> None:
         self.scene, self.e, self.matched = scene, e, matched
@@ -33,7 +33,7 @@ class World:
         self.start()
 
     def start(self) -> None:
-        """See `Stepper`: a new space, for Chipmunk remembers contacts, the last step and what it pushes apart."""
+        """See `Stepper`: a new space, for Chipmunk remembers contacts, the last step and its pushes."""
         scene = self.scene
         space = self.space = pymunk.Space()
         space.gravity = -scene.gravity * self.axis
@@ -56,7 +56,7 @@ class World:
 
 
 def _solid(shape: Shape, body: Any, e: float) -> Any:
-    """Return a circle, or a plane's wide line, without friction: a pair's restitution is the product of both."""
+    """Return a circle, or a plane's wide line, without friction: pairs multiply restitutions."""
     at, turned = pymunk.Vec2d(*np.array(shape.position)[PLANE]), matrices(np.array(shape.orientation))
     along = WIDE * pymunk.Vec2d(*turned[PLANE, 2]).perpendicular()
     solid = (

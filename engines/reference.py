@@ -31,7 +31,7 @@ UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
 """(mechanism, solver) -> why it is not run."""
 KEPT = "kept"
 TRACED = {KEPT: None, "yes": True, "no": False}
-"""Which code of a scene's sweeps is taken: that which was compiled for this model before; or now, if need be; none."""
+"""Which code of a scene's sweeps is taken: compiled for this model before, now if need be; none."""
 _ROWS, _STATE = re.compile(r"\b[Rr]ows? \[(\d+(?:, \d+)*)\]"), re.compile(r", q = \[[^]]*\], v = \[[^]]*\]")
 LONG = 16  # most numbers of a state that a message shows
 ROUNDING = 1e-12  # change of a coordinate that is none

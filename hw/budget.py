@@ -110,7 +110,7 @@ class Budget:
 
     @contextmanager
     def lifted(self) -> Iterator[None]:
-        """Do not count what is taken in here: addresses that a library reserves once for all, and does not use."""
+        """Do not count what is taken in here, addresses that a library reserves once and does not use."""
         before = _private()
         bounds = _raised()
         try:
@@ -163,7 +163,7 @@ def _lowered(ceiling: int) -> tuple[int, int] | None:
 
 
 def _raised() -> tuple[int, int] | None:
-    """Raise the bound of this process's private memory as far as it goes; what it was, None if there was none."""
+    """Raise the bound of the process's private memory as far as it goes; return what it was, None if none."""
     if not _private():
         return None
     import resource

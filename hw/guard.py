@@ -1,4 +1,4 @@
-"""The border to the libraries that parse foreign bytes: whatever they raise on damage becomes one sentence."""
+"""The border to the libraries that parse foreign bytes: what they raise on damage becomes one sentence."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def plain_allocator(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep the loggers of the parsers from writing to stderr: what matters about a file becomes our one sentence."""
+    """Keep the loggers of the parsers from writing to stderr: what matters becomes our one sentence."""
     found = list(logging.root.manager.loggerDict.items())
     loggers = [one for name, one in found if name.startswith(LOGGERS) and isinstance(one, logging.Logger)]
     levels = [logger.level for logger in loggers]

@@ -1,4 +1,4 @@
-"""How a command speaks: tables, nothing but what is wrong, or JSON. Progress goes to stderr, and only to a terminal."""
+"""How a command speaks: tables, only what is wrong, or JSON. Progress goes to a terminal's stderr."""
 
 from __future__ import annotations
 

@@ -266,7 +266,7 @@ def reference_pose(scene: Scene) -> Floats:
 
 
 def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
-    """Return controls that are held from the start on, with pushes of 0 N; None for a scene without inputs."""
+    """Return controls held from the start on, with pushes of 0 N; None for a scene without inputs."""
     if not scene.inputs:
         return None
     values = np.zeros((1, len(scene.inputs)))

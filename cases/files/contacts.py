@@ -132,7 +132,7 @@ def _looks(model: Any, t: Floats, q: Floats, v: Floats) -> Iterator[tuple[float,
 
 
 def _cubic(model: Any, t: Floats, q: Floats, v: Floats) -> Any:
-    """Return what gives positions between two instants: a cubic along the joints, through positions and velocities."""
+    """Return what gives positions between two instants: a cubic along the joints, by both ends."""
     import mujoco
 
     dt, way = float(t[1] - t[0]), np.zeros(model.nv)

@@ -16,7 +16,7 @@ from crossbody.cases.regular import open_regular
 
 BYTES = 50_000_000  # of a mesh
 READ = (".stl", ".obj", ".msh")
-"""Formats that MuJoCo reads; of the others Coal, Pinocchio's collision library, reads those that Assimp does."""
+"""Formats that MuJoCo reads; of others Coal, Pinocchio's collision library, reads those of Assimp."""
 
 TEXT = re.compile(rb"\s*solid\b[^\0]*\bfacet\b")
 """Beginning of an STL file in text, which MuJoCo does not read."""

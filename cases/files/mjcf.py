@@ -245,7 +245,7 @@ def _loop(model: Any, i: int) -> Loop:
 
 
 def _between(model: Any, one: int, two: int) -> Any:
-    """Return the orientation of the second body in the first with which the axes of two sites are the same."""
+    """Return the orientation of a body in the first with which the axes of two sites are the same."""
     import mujoco
 
     back, turn = np.zeros(4), np.zeros(4)

@@ -52,7 +52,7 @@ def _check_fields(model: Any, name: Callable[[int], str]) -> None:
 
 
 def allowed(model: Any) -> Iterator[tuple[int, int]]:
-    """Yield the numbers of shapes that may touch, by a pair of the file's or by its filters; some of them twice."""
+    """Yield the numbers of shapes that may touch, by the file's pairs or filters; some twice."""
     yield from _listed(model)
     yield from _met(model)
 

@@ -54,5 +54,5 @@ def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
 
 
 def findings_of(path: Path) -> list[str]:
-    """Return sentences on what its compiler does not see to be strange in a file, but is taken as it stands."""
+    """Return sentences on what is strange in a file to us, not to its compiler, but is taken as it stands."""
     return urdf.findings(path) if is_urdf(path) else []

@@ -1,4 +1,4 @@
-"""Which arrays of a compiled MuJoCo model are understood: any other that is not at its default ends the reading."""
+"""Which arrays of a compiled MuJoCo model are understood: any other off its default ends the reading."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def apart(spec: Any, without: str) -> Any:
 
 
 def _without_overlaps(spec: Any, model: Any) -> Any:
-    """Return the model in which bodies never touch whose shapes overlap in the reference pose, planes aside."""
+    """Return the model where bodies never touch whose shapes overlap in the reference pose, planes aside."""
     import mujoco
 
     data, plane = mujoco.MjData(model), int(mujoco.mjtGeom.mjGEOM_PLANE)

@@ -66,7 +66,7 @@ PARAMETERS = {
 }  # fmt: skip
 
 TIGHT = 1e-11
-"""Tolerance of the truth: what a0 makes of the rounding of a position counts in a settled contact before 1e-13."""
+"""Tolerance of the truth: a0 times the rounding of a settled position counts before 1e-13."""
 LOCKED = 1e6  # inertia of a locked maze, kg m^2: it turns by less than 1e-9 rad/s^2
 
 VARIANTS: dict[str, dict[str, Value]] = {

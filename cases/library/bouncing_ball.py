@@ -118,7 +118,7 @@ RADIUS = 0.05
 
 
 def scene(p: Mapping[str, float], bilateral: bool) -> Scene:
-    """Return a ball on a slide whose coordinate is the height of its lowest point, with the floor as its bound."""
+    """Return a ball on a slide by the height of its lowest point, with the floor as its bound."""
     law, (lowest, highest) = RowLaw(a0=p["a0"], a1=p["a1"], a2=p["a2"]), UNBOUNDED
     held = Loop(name="floor", type="joint", first="height", polynomial=(0.0,) * 5, law=law)
     return Scene(

@@ -105,7 +105,7 @@ def _check_corner(p: Mapping[str, float], q: Floats, name: str, side: float) -> 
 
 
 def laws(p: Mapping[str, float]) -> list[RowLaw]:
-    """Slow constants for all five rows; fast ones for corners and wall, none for the feet, which stay on the floor."""
+    """Slow constants for all five rows; fast ones for corners and wall, none for the feet, which stay."""
     slow, w = RowLaw(a0=p["a0"], a1=p["a1"]), math.sqrt(p["b0"])
     quick = [replace(slow, b0=p["b0"], b1=2.0 * p[zeta] * w) for zeta in ("zeta3", "zeta4", "zeta5")]
     return [slow, slow, *quick]

@@ -1,4 +1,4 @@
-"""Scenes with friction in DART: rigid contacts whose friction is bounded by a box, solved for within a step."""
+"""Scenes with friction in DART: rigid contacts, friction in a box, solved for within a step."""
 
 from __future__ import annotations
 
@@ -254,7 +254,7 @@ class Rubs:
         return found
 
     def _turn(self, q: Floats) -> Floats:
-        """Return dv/dv_d (nv, nv), v_d DART's: of a free joint the angular velocity first, in the world's axes."""
+        """Return dv/dv_d (nv, nv), v_d DART's: a free joint's angular velocity first, in world axes."""
         J: Floats = np.zeros((self.scene.nv, self.scene.nv))
         for joint, own in self.joints:
             at, first, to = self.forces.at[joint.name], self.forces.place[joint.name], own.getIndexInSkeleton(0)

@@ -28,7 +28,7 @@ DETECTOR = {"matched": "dart", "default": "fcl"}
 
 
 class World:
-    """A `Stepper`: bodies on prismatic joints along the line, with their shapes, beside those of the world."""
+    """A `Stepper`: bodies on prismatic joints along the line, with their shapes and the world's."""
 
     def __init__(self, scene: Line, e: float) -> None:
         self.scene, self.dt = scene, 0.0

@@ -1,4 +1,4 @@
-"""Scenes with friction in Drake's discrete plant: point contacts, by one of four approximations of Coulomb's law."""
+"""Scenes with friction in Drake's discrete plant: four approximations of Coulomb's law."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ APPROXIMATIONS = {
 }  # fmt: skip
 STICTION = 1e-3  # slip below which Drake holds, m/s, where nothing else is said
 STIFF, HOLDS, QUICK = 1e7, 1e-6, 100.0
-"""Of matched contacts: stiffness, N/m; slip below which they hold, m/s; dissipation (Hunt and Crossley), s/m."""
+"""Of matched contacts: stiffness, N/m; slip that holds, m/s; dissipation (Hunt and Crossley), s/m."""
 SOFT_BOUND = 0.99
-"""Part of its bound at which friction slides whose law comes no nearer than mu/sqrt(1 + (stiction/slip)^2)."""
+"""Part of its bound where friction slides whose law comes no nearer than mu/sqrt(1 + (stiction/slip)^2)."""
 
 
 class Rubs:
@@ -166,7 +166,7 @@ class Rubs:
 
 
 def _solids(shape: Shape, points: bool) -> list[tuple[Any, Any]]:
-    """Return places in the body and solids of a shape: of one that has places of its own, points there, or itself."""
+    """Return places in the body and solids of a shape: points at its own places, or itself."""
     turned, at = RotationMatrix(matrices(np.array(shape.orientation))), np.array(shape.position)
     place, size = RigidTransform(turned, at), shape.size
     if shape.type in ROUND and (points or shape.type == "hull"):

@@ -1,4 +1,4 @@
-"""Drake as an engine: profiles, settings, and prepared runs of bodies on a line; scenes have a file of their own."""
+"""Drake as an engine: profiles, settings, prepared runs of bodies on a line; not scenes."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _ended(
 
 
 def _multipliers(scene: Line, sim: Sim, t: Floats, x: Floats, dt: float) -> Floats:
-    """Lam (n, nc), N, from the accelerations that Drake evaluates, or from the steps of the discrete plant."""
+    """Lam (n, nc), N, from the accelerations that Drake evaluates, or from the discrete plant's steps."""
     n = len(scene.masses)
     if dt:
         change = np.vstack([np.zeros((1, n)), np.diff(x[:, n:], axis=0) / dt + scene.gravity])

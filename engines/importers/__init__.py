@@ -97,7 +97,7 @@ class Robot(Protocol):
         """Return of every loop the two frames whose origins (connect) or which (weld) it holds together, or none."""
 
     def drives(self) -> tuple[Mapping[str, Floats], Floats]:
-        """Return the force (nv,) of each actuator for one of its control, and of all of them at no control."""
+        """Return each actuator's force (nv,) for a control of one, and of all of them at no control."""
 
     def lengths(self) -> Mapping[str, float]:
         """Return the length of every tendon."""
@@ -124,7 +124,7 @@ class Robot(Protocol):
         """
 
     def inertias(self) -> Sequence[tuple[str, float, Floats, Floats]]:
-        """Return of every body: joint that moves it, mass, kg, centre (3,), inertia about it (3, 3); world axes."""
+        """Return of every body: its joint, mass, kg, centre (3,), inertia about it (3, 3), in world axes."""
 
 
 class Reading:
@@ -175,7 +175,7 @@ class Reading:
         return self.answers([job])[0]
 
     def answers(self, jobs: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-        """Return an answer a job, up to the first one that ended the process; all but the first name their `file`."""
+        """Return an answer a job, up to the first that ended the process; later ones name their `file`."""
         with self._files:
             if self._process is None:
                 return [self._without()] * len(jobs)

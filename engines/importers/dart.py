@@ -89,7 +89,7 @@ class _Robot:
         return told
 
     def place(self, q: Any, v: Any) -> None:
-        """A free joint counts from where its body stands in the file, its velocities are the world's all the same."""
+        """A free joint counts from where its body stands in the file, its velocities are the world's."""
         at, q, self._T = 0, np.array(q), np.eye(self.nv)
         for (_, _, kind, first, _), (joint, _) in zip(self.joints, self._joints, strict=True):
             if kind == "free":

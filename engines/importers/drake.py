@@ -1,4 +1,4 @@
-"""Drake's parser of robot files (`pydrake.multibody.parsing.Parser`); the root of a URDF is welded to the world."""
+"""Drake's parser of robot files (`pydrake.multibody.parsing.Parser`); a URDF's root is welded."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class _Robot:
         return [self.joints[to][0]] if kind == self._lib.mjtTrn.mjTRN_JOINT else []
 
     def _of_motors(self, joint: int, values: Any) -> float:
-        """Return what actuators add to a number of a joint: their own (nu,), by the squares of their gears."""
+        """Return what actuators add to a joint's number: their own (nu,), by their squared gears."""
         m = self._m
         own = (m.actuator_trntype == int(self._lib.mjtTrn.mjTRN_JOINT)) & (m.actuator_trnid[:, 0] == joint)
         return float((m.actuator_gear[own, 0] ** 2 * values[own]).sum())
@@ -170,7 +170,7 @@ class _Robot:
 
     @cached_property
     def _rows(self) -> Any:
-        """Model and data in which all bounds and contacts have rows: bounds are wide, shapes are balls at one place."""
+        """Model and data in which all bounds and contacts have rows: wide bounds, balls at one place."""
         lib, m = self._lib, copy(self._m)
         d = lib.MjData(m)
         for margin in (m.jnt_margin, m.tendon_margin):
@@ -186,7 +186,7 @@ class _Robot:
         return m, d
 
     def surfaces(self) -> Any:
-        """Of each pair what MuJoCo mixes: friction in force, and margin; of one without a contact nothing is known."""
+        """MuJoCo's friction in force and margin of each pair; of one without a contact nothing is known."""
         d = self._rows[1]
         shapes, told = self._touching(), dict[tuple[int, int], Any]()
         for one in d.contact:
@@ -230,7 +230,7 @@ class _Robot:
         return full
 
     def bias(self) -> Any:
-        """Weight is taken off by a passive force, or among those of the actuators; what that makes of it counts."""
+        """Weight is taken off by a passive force, or among the actuators'; its effect counts."""
         m, d = self._m, self._d
         by_motors = d.qfrc_actuator - d.actuator_force @ self._moments()
         return d.qfrc_bias - np.where(m.jnt_actgravcomp[m.dof_jntid], by_motors, d.qfrc_gravcomp)

@@ -228,7 +228,7 @@ class _Robot:
         return self._shift.T @ self._own_mass_matrix() @ self._shift
 
     def bias(self) -> Any:
-        """Forces on a free joint are in the world's axes, wherever it stands; M and velocities are in the joint's."""
+        """Forces on a free joint are in the world's axes, always; M and velocities are in the joint's."""
         own = self._g.numpy().astype(float) + self._h.numpy()
         return self._wrench.T @ own + self._shift.T @ self._own_mass_matrix() @ self._turn
 

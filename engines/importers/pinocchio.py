@@ -1,4 +1,4 @@
-"""Pinocchio's readers of robot files: `buildModelAndConstraintsFromMJCF` and `buildModelFromUrdf`, the root fixed."""
+"""Pinocchio's readers of robot files: `buildModelAndConstraintsFromMJCF`, `buildModelFromUrdf`."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class _Robot:
         return np.array(self._pin.nonLinearEffects(self._m, self._d, self._q, self._v))
 
     def energy(self) -> float:
-        """Of 4.1.0's kinetic energy some types of joints leave their armature out, which M has: it is added here."""
+        """Of 4.1.0's kinetic energy some joints leave out armature, which M has: added here."""
         kinetic = self._pin.computeKineticEnergy(self._bare, self._d, self._q, self._v)
         kinetic += self._m.armature @ self._v**2 / 2
         return float(kinetic + self._pin.computePotentialEnergy(self._m, self._d, self._q))

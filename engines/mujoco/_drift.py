@@ -22,7 +22,7 @@ from crossbody.engines.nearest import Pose, cross
 
 
 class Drift:
-    """H' v of the contacts of a scene, of the distances of its tendons between points, and of angles of ball joints."""
+    """H' v of the contacts of a scene, of its tendons between points, and of angles of ball joints."""
 
     def __init__(self, scene: Scene, model: Any, contacts: Contacts) -> None:
         self.model, self.data, self.contacts = model, mujoco.MjData(model), contacts
@@ -82,7 +82,7 @@ class Drift:
         return flat.drift((data.xmat.take(k, 0).reshape(-1, 3, 3), data.xpos.take(k, 0)), twist, change, rows)
 
     def _state(self) -> tuple[Floats, ...]:
-        """Return poses and twists of all bodies, and about which points these are: their trees' centres of mass."""
+        """Return poses and twists of all bodies, and their points: the trees' centres of mass."""
         data = self.data
         centres = data.subtree_com[self.model.body_rootid]
         return data.xmat.reshape(-1, 3, 3).copy(), data.xpos.copy(), data.cvel.copy(), centres

@@ -72,7 +72,7 @@ def rebuilt(scene: Scene, model: Any) -> Any:
 
 
 def _join(made: Any, mesh: int, model: Any, its: int) -> None:
-    """Join the corners of a hull as the file's are: what edges a flat face has is the compiler's choice each time."""
+    """Join the corners of a hull as the file's are: a flat face's edges are the compiler's choice."""
     graph, own = model.mesh_graph[model.mesh_graphadr[its] :], made.mesh_graph[made.mesh_graphadr[mesh] :]
     corners, faces = graph[:2]
     if tuple(own[:2]) != (corners, faces):

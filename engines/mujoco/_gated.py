@@ -1,4 +1,4 @@
-"""Rows of a case's own where MuJoCo has shapes that collide: what its contacts exert, as multipliers of these rows."""
+"""Rows of a case's own where MuJoCo has shapes that collide: its contacts' forces as multipliers of these."""
 
 from __future__ import annotations
 

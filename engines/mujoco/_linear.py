@@ -40,7 +40,7 @@ ONE_SIDED = 1e-6  # the step that MuJoCo's documentation suggests for one-sided 
 RESOLVED = 0.05  # largest product of the step whose logarithm is taken and the fastest pole
 ONE_WAY = (*(int(kind) for kind in LIMITS), TOUCH)  # rows whose force is bounded by 0
 HARDER = 0.1
-"""Part of the softness of bounds and loops that is left here: what it makes of slopes grows by their largest entry."""
+"""Part of bounds' and loops' softness that is left: what it makes of slopes grows by their largest entry."""
 PRESS = 10.0
 """Times the force by which a row changes in the differences: how hard one is pressed that carries less."""
 
@@ -98,7 +98,7 @@ def _stand(mechanism: ModuleType, dt: float, case: Case, spot: Spot) -> Stand:
 
 @contextmanager
 def _stepping(stand: Stand) -> Iterator[None]:
-    """Euler's step, without the implicit damping that MuJoCo adds to it; of 1 s, whose sum with v rounds least."""
+    """Euler's step, without the implicit damping that MuJoCo adds to it; of 1 s, which rounds least."""
     option = stand.model.opt
     option.integrator, option.timestep = mujoco.mjtIntegrator.mjINT_EULER, 1.0
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
@@ -161,7 +161,7 @@ def _pressed(stand: Stand, slope: Callable[[], Floats]) -> Floats:
 
 
 def _under(stand: Stand, load: Floats, slope: Callable[[], Floats]) -> Floats:
-    """The derivative under a constant load (nv,), added where a hook that sets all applied forces leaves it alone."""
+    """The derivative under a constant load (nv,), added where no hook sets it anew."""
 
     def hook(model: Any, data: Any) -> None:
         if stand.hook is not None:

@@ -115,7 +115,7 @@ class March:
         return True
 
     def _event(self, before: float) -> float:
-        """Pass to the modes behind an event: located in the step, or taken as seen at its end. Returns the time."""
+        """Pass to the modes behind an event: located in the step, or as at its end. Returns the time."""
         scene, tape = self.scene, self.tape
         if self.locator is None:
             after = scene.modes()
@@ -130,7 +130,7 @@ class March:
         return t
 
     def _settled(self, guess: Modes) -> Modes:
-        """Open and close the rows, evaluate, and read the modes that this gives, until they are what was put in."""
+        """Open and close the rows, evaluate, and read the modes, until they are what was put in."""
         scene = self.scene
         for _ in range(ROUNDS):
             if scene.arm is not None:

@@ -21,7 +21,7 @@ def mass_matrix(model: Any, data: Any) -> Floats:
 
 
 def constraint_jacobian(model: Any, data: Any) -> Floats:
-    """Return the dense rows (nefc, nv) that are active; MuJoCo keeps those of 60 velocities and more sparse."""
+    """Return the dense rows (nefc, nv) that are active; MuJoCo's are sparse from 60 velocities on."""
     if not mujoco.mj_isSparse(model):
         return np.array(data.efc_J).reshape(-1, model.nv)
     full: Floats = np.zeros((data.nefc, model.nv))
@@ -31,7 +31,7 @@ def constraint_jacobian(model: Any, data: Any) -> Floats:
 
 
 def numbers(scene: Scene) -> dict[str, int]:
-    """Return MuJoCo's number of every body, and of the world, whose name is empty; a file need not name them."""
+    """Return MuJoCo's number of every body, and the world, whose name is empty; a file need not."""
     return {"": 0, **{body.name: i for i, body in enumerate(scene.bodies, start=1)}}
 
 

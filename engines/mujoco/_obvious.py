@@ -1,4 +1,4 @@
-"""The obvious model of a scene: shapes that collide as MuJoCo has them, with its own constants, integrator and step."""
+"""The obvious model of a scene: shapes that collide with MuJoCo's own constants, integrator and step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ USUAL = 1e4
 """Stiffness over mass of bodies that collide with each other, 1/s^2: about the largest that a
 step of 2 ms resolves. MuJoCo's own constants (solref 0.02 1) would have them stick together."""
 SMALL, SLIGHT = 1e-12, 1e-8
-"""Gap that rounding may make of bodies that touch, m or rad; acceleration of the heaviest that its push is then."""
+"""Gap that rounding may make of bodies that touch, m or rad; the heaviest's acceleration by its push."""
 LOCKED = 1e-3
 """Inertia of a joint amid all, over their mean, below which one is so heavy that it stands still.
 The tolerance of MuJoCo's solver is relative to the mean: beside 1e6 kg m^2 it would never start,
@@ -30,7 +30,7 @@ FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC
 
 
 class Obvious(Rows):
-    """Rows by shapes where they are distances of shapes; closed ones push or do not, MuJoCo keeps no memory."""
+    """Rows by shapes where they are distances of shapes; closed ones push or not, without memory."""
 
     def __init__(self, scene: Scene, model: Any, data: Any) -> None:
         super().__init__(by_shapes(scene), model, data)
@@ -124,7 +124,7 @@ def _solids(scene: Scene) -> dict[str, float]:
 
 
 def _elastic(scene: Scene) -> dict[str, tuple[float, float]]:
-    """Return the solref of shapes of bodies that bounce off each other, with the damping ratio of their law."""
+    """Return the solref of shapes of bodies that bounce, with their law's damping ratio."""
     bodies = {shape.name: shape.body for shape in scene.shapes}
     found: dict[str, tuple[float, float]] = {}
     for pair in scene.pairs:

@@ -1,4 +1,4 @@
-"""The rows of a scene among those that MuJoCo has at a state: which is which, their law, gaps and multipliers."""
+"""The rows of a scene among those of MuJoCo at a state: which is which, their law, gaps and multipliers."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Rows:
         return contact.second.name not in self.geoms
 
     def pair_ids(self) -> list[int]:
-        """Return the model's pair of every contact's row, by name: the compiler sorts them by the bodies they join."""
+        """Return the model's pair of every contact's row, by name: the compiler sorts them by bodies."""
         names = [
             contact.normals if self.by_corners(contact) else (contact.pair.name,) * contact.places
             for contact in self.touching.all
@@ -113,7 +113,7 @@ class Rows:
         return [int(self.model.pair(name).id) for part in names for name in part]
 
     def constants(self, *, own: bool = False) -> dict[str, Any]:
-        """Return the law of every row as the model has it: a0, a1, a2 where it is the case's, else the pairs."""
+        """Return the law of every row as the model has it: a0, a1, a2 where the case's, else the pairs."""
         model = self.model
         solref = [*np.repeat(model.eq_solref, [loop.width for loop in self.scene.loops], axis=0)]
         bounds = {int(LIMITS[0]): model.jnt_solref, int(LIMITS[1]): model.tendon_solref_lim}
@@ -167,11 +167,11 @@ class Rows:
         return lam
 
     def _rubbing(self) -> Sequence[Rub]:
-        """Return the contacts with friction that MuJoCo has now, also of pairs whose coefficient is 0: it has 1e-5."""
+        """Return the contacts with friction that MuJoCo has now, with 1e-5 for coefficients of 0."""
         return self.rubs.at(self._met) if self.rubbing else ()
 
     def _met(self) -> dict[int, tuple[Contact, int]]:
-        """Return which of MuJoCo's contacts have friction now, and of each the scene's contact and its row."""
+        """Return which of MuJoCo's contacts have friction now, and the scene's contact and row of each."""
         there = zip(self.data.contact.dim.tolist(), self.data.contact.efc_address.tolist(), strict=True)
         known = [i for i, (dim, first) in enumerate(there) if dim > 1 and first >= 0 and self._geoms(i) in self.touches]
         return {i: (self.touches[self._geoms(i)][0], self._touch(i)) for i in known}

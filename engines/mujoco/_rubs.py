@@ -16,7 +16,7 @@ from crossbody.engines.nearest import across
 ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
 EDGES = 4  # of the pyramid of friction of a contact with two tangents
 AT_BOUND = 1e-6
-"""Part of its bound, mu times the normal force, by which friction may be off it where it slides: what solvers leave."""
+"""Part of its bound, mu times the normal force, that sliding friction may be off: what solvers leave."""
 
 
 @dataclass(frozen=True, slots=True)

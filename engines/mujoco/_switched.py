@@ -118,7 +118,7 @@ class Switched(Rows):
         return float(self.data.efc_pos[j] - self.surface[row] - REACH)
 
     def lam(self) -> Floats:
-        """Return the multiplier of every row (nc,), and keep it: what is recorded is behind a step that is taken."""
+        """Return the multiplier of every row (nc,), and keep it: records are behind steps taken."""
         found = super().lam()
         self.last = found if self.quiet else np.where(self.contact, 0.0, found)
         return found
@@ -179,7 +179,7 @@ class Switched(Rows):
         return found
 
     def _push(self, j: int, row: int) -> float:
-        """Return a contact's multiplier; of a ballistic row what is positive where it closes and would push."""
+        """Return a contact's multiplier; of a ballistic row positive where it closes and would push."""
         if self.armed[row] == FREE:
             return 1.0
         force = float(self.data.efc_force[j])
@@ -189,7 +189,7 @@ class Switched(Rows):
         return pull if self.on[row] else min(-float(self.data.efc_vel[j]), pull)
 
     def _pull(self, j: int, row: int) -> float:
-        """Return the multiplier that a row would have if it could pull, as if it were alone: no kink where it ends."""
+        """Return a row's multiplier if it could pull and were alone: no kink where it ends."""
         data = self.data
         J = constraint_jacobian(self.model, data)[j]
         moved = np.empty((1, len(J)))
@@ -204,7 +204,7 @@ class Switched(Rows):
         return J, J @ moved.T
 
     def asked(self) -> Floats:
-        """Return the multipliers (nc,) with which all rows that are there follow their law, as if they could pull."""
+        """Return the multipliers (nc,) with which all rows there follow their law, even pulling."""
         at, rows = np.array(self.present()).T
         J, G = self._delassus(at.tolist())
         lam = np.zeros(self.nc)
@@ -213,7 +213,7 @@ class Switched(Rows):
         return lam
 
     def approach(self) -> tuple[Floats, Floats, Floats]:
-        """Return gap, rate and acceleration (nc,) that every row has at the state of the data with no row acting."""
+        """Return gap, rate and acceleration (nc,) of every row at the data's state with no row acting."""
         for margin, i in self.part:
             margin[i] = FAR
         mujoco.mj_forward(self.model, self.data)
@@ -226,7 +226,7 @@ class Switched(Rows):
         return found[0], found[1], found[2]
 
     def hook(self) -> Hook | None:
-        """Return what has the law at its surface, adds H' v where MuJoCo has none, and puts rows out of force."""
+        """Return what has the law at its surface, adds H' v where MuJoCo has none, and takes rows out."""
         joints, tendons = self.scene.joints, self.scene.tendons
         bent = {(int(LIMITS[0]), i): i for i, joint in enumerate(joints) if joint.type == "ball" and joint.limited}
         bent |= {(int(LIMITS[1]), i): len(joints) + i for i, tendon in enumerate(tendons) if tendon.bodies}

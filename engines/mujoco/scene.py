@@ -1,4 +1,4 @@
-"""Any scene in MuJoCo: matched, built from the scene; default, with contacts as MuJoCo sets them; as_is, a file."""
+"""Any scene in MuJoCo: matched, built from the scene; default, with MuJoCo's contacts; as_is, a file."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ leaves multipliers of bounds off by 1e-3, 1e-4 by 1e-6 (`tests/reference/test_bo
 Loops in space bear many times what moves: 1e-7."""
 ROUNDS = 3  # of PGS, with one row
 SOLVES = 4
-"""Times that multipliers are solved for where they are compared: two leave 1e-7 of them where Newton's method ends."""
+"""Times that multipliers are solved for to be compared: two leave 1e-7 of Newton's end."""
 DEPENDENT = 1e-6
 """Singular value of the loops' rows, over the largest, below which one depends on the others."""
 CONES = {
@@ -101,14 +101,14 @@ def why_not(case: Case, profile: str) -> str | None:
 
 
 def settings(case: Case, profile: str) -> dict[str, Parameter]:
-    """Return who reads the file, MuJoCo or the project, which builds its scene; and how contacts with friction act."""
+    """Return who reads the file, MuJoCo or the project, which builds its scene; and how friction acts."""
     reader = {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
     found = reader if profile == "as_is" else {}
     return found | CONES if case.scene is not None and rough(case.scene) else found
 
 
 def default_step(case: Case, profile: str) -> float:
-    """Return the file's own step, s, or for matched parts of the fastest time constants of forces and of rows."""
+    """Return the file's step, s, or for matched parts of the fastest time constants of forces and of rows."""
     if profile == "as_is":
         return float(_from_file(case).opt.timestep)
     if profile == "default":
@@ -129,7 +129,7 @@ def default_step(case: Case, profile: str) -> float:
 
 
 def followed(case: Case, profile: str) -> Case | None:
-    """Return the case whose equations the profile integrates, if not its own; None too for constants of MuJoCo's."""
+    """Return the case whose equations the profile integrates, if not its own; None for MuJoCo's constants."""
     return real_time(case, two_sets=True) if profile == "matched" else None
 
 
@@ -270,7 +270,7 @@ def _scene(case: Case) -> Scene:
 
 
 def _from_file(case: Case) -> Any:
-    """Return MuJoCo's own reading of the file, less what is left out of every engine: a copy of what was read last."""
+    """Return MuJoCo's own reading of the file, less what every engine leaves out: a copy of the last."""
     known = _READ[0] if _READ else None
     if known is None or known[0] is not case:
         without = str(case.parameters.get("without", ""))
@@ -281,7 +281,7 @@ def _from_file(case: Case) -> Any:
 
 
 _READ: list[tuple[Case, Any]] = []
-"""The last case whose file was read, and its model: a run asks several times, and a mesh takes long to compile."""
+"""The last case whose file was read, and its model: a run asks again, and meshes take long."""
 
 
 def matched(scene: Scene) -> Any:
@@ -332,7 +332,7 @@ def _start(case: Case, data: Any, rows: Rows, acting: Acting, driver: Forces | N
 
 
 def _hook(case: Case, data: Any, rows: Switched | None, driver: Forces | None) -> Hook | None:
-    """Return what MuJoCo calls in every stage: its terms of rows that are left out, activations and forces then."""
+    """Return what MuJoCo calls in every stage: terms of rows left out, activations and forces."""
     own, force = rows.hook() if rows is not None else None, case.force
     if driver is None and force is None:
         return own

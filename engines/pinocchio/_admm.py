@@ -52,7 +52,7 @@ class Touching:
         self._made: dict[tuple[int, ...], Any] = {}
 
     def impulses(self, q: Floats, g: Floats, closed: tuple[int, ...]) -> Floats:
-        """Solve 0 <= p perp G p + g >= 0 (or G p + g = 0) with a Delassus operator made anew: ADMM changes it."""
+        """Solve 0 <= p perp G p + g >= 0 (or G p + g = 0) with a new Delassus operator: ADMM changes it."""
         made = self._made.get(closed) or self._problem(q, closed)
         if self.points.steady:
             self._made[closed] = made
@@ -111,7 +111,7 @@ class TimeStepper:
         return self.touching.iterations
 
     def run(self, q0: Floats, v0: Floats, t_end: float, dt: float) -> None:
-        """Step from (q0, v0) to t_end, s; lam is the impulse of the step before each instant over its length."""
+        """Step from (q0, v0) to t_end, s; lam is the impulse of the step before over its length."""
         t, q, v = 0.0, np.array(q0), np.array(v0)
         modes = first_modes(self.rows)
         theta = 1.0 if BILATERAL in modes else 0.5

@@ -50,7 +50,7 @@ class ContactRows:
         return np.concatenate(gaps) if self.count else np.zeros((len(q), 0))
 
     def parted(self, q: Floats, which: Sequence[int]) -> tuple[Floats, Floats]:
-        """Return by how much shapes that may lie along each other do not, and to which side (`Contacts.parted`)."""
+        """Return how far shapes are from lying along each other, and to which side (`Contacts.parted`)."""
         return self.contacts.parted(self._now(q), which)
 
     def gradients(self, q: Floats, rows: Sequence[int] | None = None) -> tuple[Floats, Floats]:
@@ -96,7 +96,7 @@ class ContactRows:
         return drift(rates, v, turn)
 
     def _stacked(self, R: Floats, p: Floats) -> Poses:
-        """Return what gives each body's poses at several instants, of those of all (m, nb, 3, 3) and (m, nb, 3)."""
+        """Return what gives each body's poses at several instants, of all (m, nb, 3, 3) and (m, nb, 3)."""
         return {body: (R[:, i], p[:, i]) for i, body in enumerate(self.contacts.bodies)}.__getitem__
 
     def _now(self, q: Floats) -> Poses:

@@ -24,15 +24,15 @@ from crossbody.reference.sundials.solvers import CVODE
 PER_SOLVE = 100_000
 """Internal steps that CVODE may take before it returns; it returns after each, so this never binds."""
 ROOT_FOUND = 2
-"""CVODE's word for a step that ended at a zero of a watched function; later steps still carry the old events."""
+"""CVODE's word for a step that ended at a zero of a watched function; later ones carry old events."""
 VANISHED = 1e-6
-"""Part of H M^-1 H^T of a row at the start below which nothing is left that could move the row as its law says."""
+"""Part of H M^-1 H^T of a row at the start below which nothing moves the row as its law says."""
 TINY = 1e-300
-"""In place of a watched function that is exactly 0: it has not passed yet. CVODE complains of what stays at 0."""
+"""In place of a watched function that is exactly 0: it has not passed yet. CVODE dislikes what stays at 0."""
 LOOKS = np.linspace(0.0, 1.0, 10)[1:-1].tolist()
 """Parts of a step at which rows are looked at that may have turned twice in it."""
 ROUNDED = 8.0 * ULP
-"""Part of the largest coordinate that rounding may make of a gap: what hangs side by side touches and parts by it."""
+"""Part of the largest coordinate that rounding may make of a gap: what hangs side by side parts by it."""
 SAME_INSTANT = 100  # events in a row without the time moving on that make a cycle
 
 
@@ -142,7 +142,7 @@ class Flow:
         return y
 
     def _vanished(self, y: Floats) -> str:
-        """What to say where hardly anything moves a row any more that has to move, and something did at the start."""
+        """What to say where hardly anything moves a row that must move, and something did at the start."""
         q = self._state(y)[0]
         on = [i for i, mode in enumerate(self.modes) if mode in ACTIVE]
         before, now = (np.diag(self.rows.delassus(at))[on] for at in (self.start, q))
@@ -224,7 +224,7 @@ class Flow:
         self.log.events += Settled(self.modes, np.zeros(0), passed).events(t)
 
     def _pulls(self, lam: Floats) -> bool:
-        """Whether a contact pulls though its zero was not found: it began below, by the rounding of its start."""
+        """Whether a contact pulls though its zero was not found: it began below, by rounding."""
         return any(m in ACTIVE and m != Mode.BILATERAL and lam[i] < 0.0 for i, m in enumerate(self.modes))
 
     def _passed_over(self, t: float, before: Floats, step: Any, fired: Fired) -> float | None:

@@ -22,7 +22,7 @@ GAP, TURN = 0, 1
 PUSH = 1  # the functions watched of a row that is free, and of one that is held
 SLOW = 1e-9  # part of the largest rate of a gap below which it stands still
 WEAK = 1e-7
-"""Part of the largest acceleration of a gap below which a row at rest is not pressed: an integration's error may be."""
+"""Part of a gap's largest acceleration below which a row at rest is not pressed: an error may be."""
 TIES = 1e-12  # part of an approach within which two rows approach equally
 PER_ROW = 1000  # impacts of one row at one instant that make a cycle
 
@@ -40,7 +40,7 @@ def restitution(law: Law, row: int) -> float:
 
 
 def capture_speed(press: float, a0: float, e: float) -> float:
-    """Approach speed below which the law never lets go, m/s: press / (w e^(3/2)), press = -h'' without the row."""
+    """Approach speed below which the law never lets go, m/s: press / (w e^(3/2)), press = -h'' without it."""
     if not (a0 > 0.0 and e > 0.0):
         return math.inf
     return max(press, 0.0) / (math.sqrt(a0) * math.pow(e, 1.5))

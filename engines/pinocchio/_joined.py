@@ -160,7 +160,7 @@ class Spans:
         self.moving = np.array([carried(model, joint) for joint in self.joints])
 
     def _apart(self) -> tuple[Floats, Floats, Floats]:
-        """Return the points of the ends (ne, 3), distances (nt,), and directions from first to second (nt, 3)."""
+        """Return the points of the ends (ne, 3), distances (nt,), directions from first to second (nt, 3)."""
         turned, origins = poses_of(self.data, self.joints)
         arms = (turned @ self.arms[:, :, None])[:, :, 0]
         # What moves alike stays as far apart to the last bit: bodies that hang side by side touch, or do not.
@@ -178,7 +178,7 @@ class Spans:
         return self._apart()[1]
 
     def __call__(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return l (nt,) and dl/dv (nt, nv): an end's n.v is n.(linear) + (x cross n).(angular), as of the origin."""
+        """Return l (nt,) and dl/dv (nt, nv): an end's n.v is n.(linear) + (x cross n).(angular)."""
         pin.computeJointJacobians(self.model, self.data, q)
         points, d, n = self._apart()
         J = self.data.J.reshape(6, -1)  # of one column it is a vector
@@ -221,7 +221,7 @@ class Strings:
 
     @property
     def chained(self) -> bool:
-        """Whether the ends move apart from each other, or as one, and one bound each makes no ring of them."""
+        """Whether the ends move apart from each other, or as one, and bounds make no ring of them."""
         kinds, group = np.unique(self.spans.moving, axis=0, return_inverse=True)
         one, two = (group[ends][self.of] for ends in (self.spans.one, self.spans.two))
         joined = connected_components(coo_array((np.ones(len(one)), (one, two)), (len(kinds),) * 2), directed=False)[0]

@@ -111,7 +111,7 @@ def _same_coordinates(mechanism: ModuleType) -> Callable[[Case, Spot], Stand]:
 
 
 def _constrained(native: Native) -> Callable[[Stand, Floats], tuple[Tangent, ...]]:
-    """Return what gives Pinocchio's own derivatives of the constrained dynamics, and what is wrong with them."""
+    """Return what gives Pinocchio's derivatives of the constrained dynamics, and what is wrong with them."""
 
     def ways(stand: Stand, right: Floats) -> tuple[Tangent, ...]:
         q, v = stand.q, stand.v

@@ -1,4 +1,4 @@
-"""Loops as Pinocchio's own constraints: where no row ever opens, its constrained dynamics solve for all at once."""
+"""Loops as Pinocchio's own constraints: where no row opens, its dynamics solve for all at once."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ SMALL = 1e-14  # part of the largest velocity below which a gap that is held sta
 
 
 def by_forward_dynamics(model: Any, data: Any, tau: Floats) -> Solve:
-    """Pinocchio's own solver of M v' + b = tau + J^T lam, J v' + gamma = 0 (upstream calls it unsupported)."""
+    """Pinocchio's own solver of M v' + b = tau + J^T lam, J v' + gamma = 0 (unsupported upstream)."""
 
     def solve(q: Floats, v: Floats, J: Floats, gamma: Floats) -> tuple[Floats, Floats]:
         vd = pin.forwardDynamics(model, data, q, v, tau, J, gamma, 0.0)
@@ -81,7 +81,7 @@ def pose(position: Any, orientation: Any) -> Any:
 
 
 def point_jacobian(model: Any, data: Any, joint: int, point: Floats) -> Floats:
-    """Jacobian (3, nv) of the velocity of a point in the world that a joint carries, after computeJointJacobians."""
+    """Jacobian (3, nv) of the velocity of a point that a joint carries, after computeJointJacobians."""
     if joint == 0:
         return np.zeros((3, model.nv))
     found = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)

@@ -18,7 +18,7 @@ from crossbody.engines._machines import ACTIVE
 from crossbody.engines.pinocchio._contacts import ContactRows
 
 BACK = 1e-6
-"""Part of what separates both ways by which shapes go on before they lie the other way: rounding turns none back."""
+"""Part of what separates both ways by which shapes go on first: rounding turns none back."""
 
 
 class Ways:
@@ -48,7 +48,7 @@ class Ways:
         self.forget()
 
     def hold(self, q: Floats, modes: Modes) -> bool:
-        """Hold the ways of pairs of which a row is in force, as they lie now if they were not, and of no other."""
+        """Hold the ways of pairs of which a row is in force, as they lie now if they were not."""
         along, before = self.touching.along, len(self.touching.along)
         wanted = [k for k, rows in zip(self.turning, self.rows, strict=True) if any(modes[i] for i in rows)]
         for k in [k for k in along if k not in wanted]:

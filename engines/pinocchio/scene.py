@@ -177,7 +177,7 @@ def _of_parts(
 
 
 def _given_sizes(case: Case, to: Coordinates) -> tuple[Floats, Floats] | None:
-    """Return the sizes of coordinates (nq,) and velocities (nv,) that a force gives; those of robots are small."""
+    """Return sizes of coordinates (nq,) and velocities (nv,) of a force; those of robots are small."""
     if case.general:
         return np.full(to.nq, SMALL), np.full(to.nv, SMALL)
     force = case.force
@@ -330,7 +330,7 @@ KEPT = 2  # places at which answers are kept: the end of a step and its start, t
 
 
 class LastAsked:
-    """The last answers of a function of q, which may only be read: a step asks several times at both of its ends."""
+    """The last answers of a function of q, which may only be read: a step asks again at both ends."""
 
     def __init__(self, function: Callable[[Floats], Gradients]) -> None:
         self.function = function
@@ -366,7 +366,7 @@ def spans(scene: Scene, model: Any, placed: Placed, to: Coordinates) -> Callable
 
 
 def _order(scene: Scene) -> list[int]:
-    """Return where each row of a scene stands where loops in space come last but one, and distances of points last."""
+    """Return where each row stands if loops in space come last but one, and distances of points last."""
     kinds = [1 * loop.in_space for loop in scene.loops for _ in range(loop.width)]
     for part in scene.bounded:
         kinds += [2 * (isinstance(part, Tendon) and bool(part.bodies))] * int(np.isfinite(part.range).sum())
@@ -411,7 +411,7 @@ def _inertia(body: Body) -> Any:
 
 
 def at_centres(scene: Scene, forces: parts.Forces, model: Any, data: Any, placed: Placed) -> Callable[[Floats], Floats]:
-    """Return what gives, at q, the generalised force (nv,) of the weight that bodies are spared, and of pushes."""
+    """Return what gives, at q, the generalised force (nv,) of the weight that bodies lack, and of pushes."""
     own = {body.name: np.array(body.com) for body in scene.bodies}
     lifted = {
         body.name: -body.weightless * body.mass * np.array(scene.gravity) for body in scene.bodies if body.weightless
@@ -484,7 +484,7 @@ def _world(case: Case, forces: parts.Forces, to: Coordinates) -> World:
 
 
 def mechanics(scene: Scene, bodies: Bodies) -> dict[str, Any]:
-    """Return for the audit the masses body by body, M and the bias at zero input, in the scene's coordinates."""
+    """Return for the audit all masses, M and the bias at zero input, in the scene's coordinates."""
     model, data, to, forces, tau = bodies.model, bodies.data, bodies.to, bodies.forces, np.zeros(bodies.model.nv)
 
     def M(q: Floats) -> Floats:

@@ -40,5 +40,5 @@ class Finding:
 
 
 def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
-    """The first finding of every check and channel: a slip may be seen in the coordinate and against its rate."""
+    """First finding of each check and channel: a slip may show in the coordinate and against its rate."""
     return list({(f.channel, f.check): f for f in reversed(list(findings))}.values())[::-1]

@@ -1,4 +1,4 @@
-"""Does a coordinate jump where it should move? Encoders that wrap at a turn, slips, and samples that stand alone."""
+"""Does a coordinate jump where it should move? Wraps of encoders, slips, samples that stand alone."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ class _Suspects:
         return Jumps(at=at[kept] + 1, turns=turns[kept], size=size, span=ones, spike=ones == 0, fast=fast)
 
     def _spikes(self, at: Indices) -> Iterator[Jumps]:
-        """A sample or two off the line between those before and after; two steps on either side must be alike."""
+        """A sample or two off the line between those before and after; two steps beside it must be alike."""
         x = self._values
         for span in LONE:
             first = _near(at, 1, len(x), EDGE + 1, EDGE + span)

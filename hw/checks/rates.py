@@ -37,7 +37,7 @@ UNITS = {
 
 
 def _usual(spans: Floats) -> NDArray[np.bool_]:
-    """Which spans tell about gain and correlation: not the few that disagree far more than the rest, as slips do."""
+    """Which spans tell about gain and correlation: not the few that disagree far more, as slips do."""
     products = np.einsum("ik,jk->ij", spans, spans)
     if not np.all(np.isfinite(products)):  # what is that large has a check that tells it
         return np.ones(spans.shape[1], np.bool_)
@@ -146,7 +146,7 @@ class RateCheck:
             self._worst = float(dq[i]), float(iv[i]), int(rows[i]), float(times[i])
 
     def _line(self) -> tuple[Floats, Floats, float]:
-        """Gain and delay, their standard errors, and the squared correlation; 1 and 0 if there is too little."""
+        """Gain, delay, their standard errors and the squared correlation; 1 and 0 if there is too little."""
         known, wanted, size = self._products[1:, 1:], self._products[1:, 0], self._products[0, 0]
         told = np.all(np.isfinite(self._products)) and self._n >= FEWEST and size > 0.0
         if not told or not np.linalg.det(known) > 1e-9 * known[0, 0] * known[1, 1]:
@@ -157,7 +157,7 @@ class RateCheck:
         return found, np.sqrt(np.diag(inverse) * left / (self._n - 2)), 1.0 - left / size
 
     def _moves(self) -> bool:
-        """Whether the coordinate does more than show its noise and the steps of its encoder, with or without slips."""
+        """Whether the coordinate shows more than noise and steps of its encoder, with or without slips."""
         count, squares, *products = self._moved.T
         size = np.sqrt(squares / np.maximum(count, 1.0))
         surely = np.maximum(CHANCE / np.sqrt(np.maximum(count, 1.0)), SMOOTH)
@@ -186,7 +186,7 @@ class RateCheck:
         return [self._told("rates", text, row, t, fault=True)]
 
     def _about_line(self) -> list[Finding]:
-        """A delay, or a gain that noise of the velocity does not explain: that lowers it to the squared correlation."""
+        """A delay, or a gain below the squared correlation, to which noise of the velocity lowers it."""
         (gain, late), (unsure, early), alike = self._line()
         late -= self._lag
         row, t = (self._worst[2:]) if self._worst is not None else (0, np.nan)

@@ -23,7 +23,7 @@ FAST = 16  # steps longer than half a turn
 
 
 def _chunks(length: int, first: bool, last: bool) -> Iterator[tuple[slice, int, int]]:
-    """Whole chunks of what is held, and which of their samples each judges; the rest as one if it is the last."""
+    """Whole chunks of what is held, and which of their samples each judges; the rest as one at the end."""
     at = 0
     while length - at >= 2 * CHUNK or (last and length - at > (0 if first else 2 * HALF)):
         stop = at + CHUNK if length - at >= 2 * CHUNK else length

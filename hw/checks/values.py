@@ -162,7 +162,7 @@ class Runs:
         self._tail = whole[-FAR:]
 
     def _grid(self) -> float:
-        """Return the smallest step, but for rare ones and for the rounding of what was computed from counts."""
+        """Return the smallest step, but for rare ones and the rounding of what was computed from counts."""
         least = np.log(max(ROUNDING * self._size, np.finfo(float).tiny)) / FINE
         steps = sorted((place, count) for place, count in self._steps.items() if place > least)
         rare = int(RARE * sum(count for _, count in steps))

@@ -28,7 +28,7 @@ from crossbody.cases.arrays import Floats
 
 LEVEL = 0.95
 PARTS = 16
-"""Contributions that a variance is found from, at least: cosines of each window where there are fewer windows."""
+"""Contributions that a variance is found from, at least: cosines of each where windows are fewer."""
 WHITE = 0.05  # probability below which residuals do not count as white
 LAGS = 10  # lags of the test for white residuals
 STRONGEST = 0.999  # largest lag-1 correlation of the noise that is told from a drift

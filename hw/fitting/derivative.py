@@ -103,7 +103,7 @@ class Exact:
         return np.stack([self._window(j, x, i)[1] for i in self._columns(j)], axis=1)
 
     def checked(self, x: Floats, J: Floats, sizes: Floats, low: Floats) -> float:
-        """Largest relative difference of the first columns of J, one for each size, and central differences."""
+        """Largest relative difference of the first columns of J, one a size, and central differences."""
         return max(apart(self.residual, x, J, i, 1e-5 * size, low[i]) for i, size in enumerate(sizes))
 
     def flat(self, x: Floats) -> dict[int, str]:
@@ -200,7 +200,7 @@ def apart(
 
 
 def _hermite(t: Floats, y: Array, yd: Array, when: Array) -> Array:
-    """Cubic between samples, column by column, in complex arithmetic; beyond the ends the last cubic goes on."""
+    """Cubic between samples, column by column, in complex arithmetic; the last cubics go on beyond."""
     found = np.empty(when.shape, np.complex128)
     for c in range(when.shape[1]):
         i = np.clip(np.searchsorted(t, when[:, c].real, side="right") - 1, 0, len(t) - 2)

@@ -132,7 +132,7 @@ def _chance(best: Floats) -> float:
 
 
 def _scatter(rise: Floats, best: Floats, count: int) -> float:
-    """What a mean rise of the windows' sums of squares must exceed; of one window that of its white residuals."""
+    """What a mean rise of the windows' sums of squares must exceed; of one window, of its white residuals."""
     if len(rise) < 2:
         return 4.0 * float(best[0]) / count
     return float(stats.t.ppf(0.975, len(rise) - 1) * stats.sem(rise))

@@ -1,4 +1,4 @@
-"""What an identification finds: values, their 95 % intervals, what the data cannot tell, and held-out windows."""
+"""What an identification finds: values, 95 % intervals, what the data cannot tell, held-out windows."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class Fit:
 
     @property
     def success(self) -> bool:
-        """Whether the search converged and was judged; whether the estimates are worth anything, `worse` tells."""
+        """Whether the search converged and was judged; what the estimates are worth, `worse` tells."""
         return self.outcome == CONVERGED
 
     def __getitem__(self, name: str) -> Estimate:

@@ -1,4 +1,4 @@
-"""Identify parameters of a model from a log: bounded least squares over windows, others held out to judge it by."""
+"""Identify parameters of a model from a log: bounded least squares over windows, others judge it."""
 
 from __future__ import annotations
 

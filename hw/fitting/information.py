@@ -16,7 +16,7 @@ from scipy import linalg
 from crossbody.cases.arrays import Floats
 
 NULL = 1e-8
-"""Singular value of the derivatives, columns of norm 1, over the largest, below which a direction has no effect."""
+"""Singular value of the derivatives, columns of norm 1, over the largest, below which one has no effect."""
 BELONGS = 0.3
 """Part of the largest weight of a direction from which on keeping a parameter is a good way to remove it."""
 ROUNDING = 1e-9  # entry of a direction, of 1, that elimination makes of none
@@ -86,7 +86,7 @@ def to_keep(null: Floats, influence: Floats) -> tuple[int, ...]:
 
 
 def weak(covariance: Floats, sizes: Floats, quantile: float) -> Floats:
-    """Directions (D, P) of relative changes that the data tell worse than the sizes of the parameters themselves."""
+    """Directions (D, P) of relative changes that the data tell worse than the parameters are large."""
     if not len(covariance):
         return np.zeros((0, 0))
     values, vectors = np.linalg.eigh(covariance / np.outer(sizes, sizes))

@@ -99,7 +99,7 @@ def judged(search: Search) -> Fit:
 
 
 def unjudged(search: Search, seconds: float) -> Fit:
-    """The fit of a search that was stopped, or that nobody had the time to judge: the best so far and nothing else."""
+    """The fit of a search that was stopped, or not judged in time: the best so far and nothing else."""
     found, free = search.found, search.free
     ended = "its search had converged and was not judged" if found.success else found.message
     message = f"Stopped at the time limit of {seconds:g} s: {ended}"
@@ -159,7 +159,7 @@ def _identifiable(value: float, half: float, bounds: tuple[float, float]) -> boo
 
 
 def _narrow(search: Search, halves: Mapping[int, float]) -> dict[int, str]:
-    """Parameters that free starts would move out of their intervals from measured ones: index -> that in words."""
+    """Parameters that free starts would move out of their intervals: index -> that in words."""
     problem, found, count = search.problem, search.found, len(search.free)
     if problem.starts or not isinstance(problem, Exact) or not found.success:
         return {}
@@ -176,7 +176,7 @@ def _narrow(search: Search, halves: Mapping[int, float]) -> dict[int, str]:
 def _unseen(
     search: Search, null: Floats, spread: Scatter, own: NDArray[np.int64], blind: NDArray[np.bool_]
 ) -> dict[str, str]:
-    """Directions of several parameters that the data do not see at all, or hardly: sentence -> combination."""
+    """Directions of several parameters that the data do not or hardly see: sentence -> combination."""
     names, found = search.free, {}
     kept = [names[i] for i in search.found.kept]
     for row in null:

@@ -81,7 +81,7 @@ class _Timed:
         return self.derivatives(self.whole(part))[:, self.free]
 
     def best_so_far(self, kept: Sequence[int], message: str, limits: tuple[Floats, Floats]) -> Found:
-        """Where a search was that did not come to its end; its start, without residuals, if it had not begun."""
+        """Where a search was that did not end; its start, without residuals, if it had not begun."""
         _, x, r = self.best or (np.inf, self.x, np.zeros(0))
         active = ((x <= limits[0]) | (x >= limits[1])) & ~np.isin(np.arange(len(x)), kept)
         return Found(

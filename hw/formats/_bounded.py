@@ -1,4 +1,4 @@
-"""What keeps readers within a budget: of columns and numbers, of structures that lead back, of unfolded chunks."""
+"""What keeps readers within a budget: of columns and numbers, structures that lead back, unfolded chunks."""
 
 from __future__ import annotations
 

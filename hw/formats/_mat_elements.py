@@ -1,4 +1,4 @@
-"""The elements of a MAT v5 file: one variable out of it, unfolded within a budget, before anything recurses into it."""
+"""The elements of a MAT v5 file: one variable, unfolded within a budget before anything recurses into it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What readers of tables share: names and groups of columns, blocks of rows; arrays of equal length belong together."""
+"""What readers of tables share: names and groups of columns, blocks of rows; equally long arrays are one."""
 
 from __future__ import annotations
 

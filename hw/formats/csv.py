@@ -60,7 +60,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def wide_encoding(head: bytes) -> str:
-    """The UTF-16 that a file begins in, by its mark or by where its zeros are; empty if it is another encoding."""
+    """The UTF-16 that a file begins in, by its mark or by where its zeros are; empty for another encoding."""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     pairs = max(len(head) // 2, 1)
@@ -74,7 +74,7 @@ def open_log(path: Path, options: Options) -> CsvReader:
 
 
 class CsvReader:
-    """A table of text, a megabyte at a time. Cells are numbers or an error: nothing in them is ever evaluated."""
+    """A table of text, a megabyte at a time. Cells are numbers or an error: nothing is evaluated."""
 
     def __init__(self, path: Path, options: Options) -> None:
         if options.encoding == "utf-8":

@@ -89,7 +89,7 @@ class McapReader:
             yield group
 
     def _counts(self) -> tuple[dict[str, int], dict[str, tuple[Any, Any, bytes]]]:
-        """Messages of every topic, from the summary or by going through the file, and the first message of each."""
+        """Messages of every topic, by the summary or the whole file, and the first message of each."""
         told = self._told()
         counts: dict[str, int] = {}
         first: dict[str, tuple[Any, Any, bytes]] = {}
@@ -138,7 +138,7 @@ class McapReader:
         return int(start)
 
     def _messages(self, topic: str | None) -> Iterator[tuple[Any, Any, int, int, bytes]]:
-        """Schema, channel, log time, publish time and data of the messages of a topic, or of all, as they stand."""
+        """Schema, channel, both times and data of messages of a topic, or of all, as they stand."""
         from mcap.data_stream import ReadDataStream
         from mcap.records import Channel, Schema
 

@@ -114,7 +114,7 @@ class MdfReader:
 
 
 def _has_formula(conversion: Any, depth: int = 0) -> bool:
-    """Whether a conversion, or one that it refers to, is text to be evaluated: asammdf would run it as code."""
+    """Whether a conversion, or one that it refers to, is text to be evaluated: asammdf would run it."""
     if depth > DEEPEST or bool(getattr(conversion, "formula", None)):
         return True
     refers = getattr(conversion, "referenced_blocks", None) or {}

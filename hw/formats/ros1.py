@@ -54,7 +54,7 @@ class RosbagReader:
             self.groups = tuple(self._topics())
 
     def _bound_chunks(self) -> None:
-        """Let the chunks of a ROS 1 bag be unfolded by us: rosbags does so again wherever two overlap in time."""
+        """Let the chunks of a ROS 1 bag be unfolded by us: rosbags does so anew wherever two overlap."""
         from rosbags.rosbag1.reader import decompressors
 
         names = {function: name for name, function in decompressors.items()}
@@ -134,7 +134,7 @@ def fault_of(types: Mapping[str, Any], name: str) -> str:
 
 
 def _least(types: Mapping[str, Any], name: str, depth: int, known: dict[str, int]) -> int:
-    """Number of values that a message of a type holds at least; those of lists without a fixed length are none."""
+    """Number of values that a message of a type holds at least; lists without a fixed length have none."""
     if name in known or name not in types:
         return known.get(name, 1)
     if depth > DEEPEST:

@@ -1,4 +1,4 @@
-"""A pendulum of links: hinges with viscous and smoothed dry friction, absolute angles from the upright vertical."""
+"""A pendulum of links: viscous and smoothed dry friction in hinges, absolute angles from the upright."""
 
 from __future__ import annotations
 

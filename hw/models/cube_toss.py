@@ -55,7 +55,7 @@ def see(model: Model, run: Trajectory, times: Floats) -> tuple[Floats, Floats]:
 
 
 def differ(y: Floats, yhat: Floats) -> Floats:
-    """Difference of the places alone (n, 3), m: the turn of a cube that rolls over another edge is another motion."""
+    """Difference of the places alone (n, 3), m: a cube that rolls over another edge turns otherwise."""
     return y[:, :3] - yhat[:, :3]
 
 

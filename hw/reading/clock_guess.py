@@ -70,7 +70,7 @@ def _guess(column: Column, raw: NDArray[Any]) -> ClockGuess:
 
 
 def unit_of_ticks(raw: NDArray[Any]) -> str:
-    """The unit that times without one seem to be in: seconds, unless their steps would be minutes and more."""
+    """The unit that times without one seem to be in: seconds, unless steps would be minutes."""
     with np.errstate(over="ignore", invalid="ignore"):
         steps = np.diff(raw[:EARLY].astype(np.float64))  # what a float64 leaves of a large integer tells its size
     steps = steps[np.isfinite(steps) & (steps > 0.0)]

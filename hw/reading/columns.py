@@ -171,7 +171,7 @@ def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns
 
 
 def _check_numbers(value: Any, key: str, path: str | Path) -> None:
-    """Refuse whole numbers beyond the 64 bits of TOML, which Python takes: not even a message could show them."""
+    """Refuse whole numbers beyond the 64 bits of TOML, which Python takes: no message could show them."""
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
         raise ColumnMapError(path, key, "is a whole number of more than 64 bits.")
     inside = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()

@@ -195,7 +195,7 @@ def _checked(plan: Plan, sources: Sequence[Source], block: Rows) -> Checks:
 
 
 def _joined(found: Scan, block: Rows, limit: int, *, unwrap: bool) -> tuple[Rows, tuple[Repair, ...]]:
-    """The rows with the signals that have times of their own, without the leading rows that lack one of them."""
+    """Rows with the signals of times of their own, without the leading rows that lack one of them."""
     plan, lead, repairs = found.plan, 0, tuple[Repair, ...]()
     values: dict[str, Floats] = {s.label: v for s, v in zip(plan.own, block.values, strict=True)}
     for _, group in groupby(sorted(plan.joined, key=_clock), key=_clock):

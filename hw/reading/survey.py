@@ -1,4 +1,4 @@
-"""What is in a file that nobody has described yet: channels, rates, gaps, ranges, and a draft of a column map."""
+"""What is in a file that nobody has described: channels, rates, gaps, ranges, a draft of a column map."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ class Comparison:
         return np.concatenate([w.t for w in self.windows])
 
     def after(self, prediction: Prediction, age: float) -> Floats:
-        """Largest |error| over the coordinates at a time after each restart, s; windows that are shorter left out."""
+        """Largest |error| over the coordinates at a time after each restart, s, without shorter windows."""
         found = []
         for window, yhat in zip(self.windows, prediction.y, strict=True):
             k = int(np.searchsorted(window.t - window.t[0], age - 1e-9))
@@ -240,7 +240,7 @@ class Comparison:
         return (float(f"{0.5 * length:.4g}"), float(f"{length:.4g}")) if len(self.windows) > 1 else ()
 
     def measurement(self) -> Trajectory:
-        """What was measured, as a motion in the model's measured coordinates; it has no forces and no modes."""
+        """What was measured, as a motion in the model's measured coordinates; without forces and modes."""
         y = [w.y for w in self.windows]
         return self._trajectory(
             y, [rates_by_fit(w.t, way(w.y, self.turns)) for w in self.windows], Outcome.FINISHED, "", 0, 0.0

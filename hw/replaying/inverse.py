@@ -59,7 +59,7 @@ class Inferred:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Balance:
-    """S^T (M v' - f) (n, k), S^T B (n, k, nu), S^T M S (n, k, k) and the noise of the accelerations (n, k)."""
+    """S^T (M v' - f) (n, k), S^T B (n, k, nu), S^T M S (n, k, k) and the noise of accelerations (n, k)."""
 
     t: Floats
     needed: Floats
@@ -203,7 +203,7 @@ def _one(
 
 
 def noise_of(t: Floats, y: Floats, half: int, degree: int) -> Floats:
-    """Standard deviation of the samples about their polynomials (k,), all parameters of which are paid for."""
+    """Standard deviation of the samples about their polynomials (k,), whose parameters are paid for."""
     rows = np.arange(half, len(t) - half)
     value, _, _, gain = derivatives(t, y, half, degree, rows)
     # The residual at the middle of a polynomial has the variance 1 - gain^2 of the noise.

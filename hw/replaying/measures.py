@@ -14,10 +14,10 @@ from crossbody.hw.windows.whiteness import noise_level, products
 
 REACH = 0.25  # largest lag that is looked at, as a part of a window
 RIVAL = 0.9
-"""Part of the highest correlation from which on a maximum may be the delay: real models are off by that much."""
+"""Part of the highest correlation from which on a maximum may be the delay: real models are so far off."""
 ALIKE = 0.8  # part of the correlation that noise admits, from which on two motions have the same shape
 REPEATS = 0.1
-"""Angle between a motion and itself moved (arc cosine of their correlation), up to which the motion repeats itself."""
+"""Angle (arc cosine of the correlation) between a motion and itself moved up to which it repeats itself."""
 EXPLAINED = 3.0
 """That angle over the one between measurement and prediction where they are most alike, up to
 which a maximum that is lower for the model's error alone may be the delay. Of 1,200 motions of
@@ -124,13 +124,13 @@ def _vertex(rho: Floats, k: int, wide: int = WIDE) -> tuple[float, float]:
 
 
 def _height(rho: Floats, k: int) -> tuple[float, float]:
-    """How high the maximum near sample k is, and to what that is known, by how far off fewer neighbours would be."""
+    """Height of the maximum near sample k, and to what it is known, by how far off fewer neighbours are."""
     height = _vertex(rho, k)[1]
     return height, UNSURE * abs(height - _vertex(rho, k, WIDE - 1)[1])
 
 
 def _angle(rho: Floats, k: int) -> float:
-    """Least angle between two motions near lag k from their correlations, rad; of the highest within two samples."""
+    """Least angle between two motions near lag k from their correlations, rad: of the highest within two."""
     near = k - 2 + int(np.argmax(rho[k - 2 : k + 3]))
     return math.acos(min(sum(_height(rho, near)), 1.0))
 

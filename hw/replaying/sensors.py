@@ -56,7 +56,7 @@ def _earlier(t: Floats, x: Floats, xd: Floats | None, delay: float) -> Floats:
 
 
 def lagged(t: Floats, x: Floats, rate: float, *, held: bool = True) -> Floats:
-    """Y' = ks (x - y) from y = x at the start, exact for x that holds between samples, or is linear between them."""
+    """Y' = ks (x - y) from y = x at the start, exact for x that holds or is linear between samples."""
     y = np.empty_like(x)
     y[0] = x[0]
     for k in range(len(t) - 1):

@@ -14,7 +14,7 @@ from crossbody.hw.windows.rates import HALF
 from crossbody.hw.windows.window import Window
 
 ROUNDS = 2
-"""Of Gauss and Newton with the first derivatives: over a few samples the motion is all but linear in its start."""
+"""Of Gauss and Newton with the first derivatives: few samples are all but linear in the start."""
 
 
 def fitted_starts(model: Model, numbers: Mapping[str, Value], cut: Sequence[Window], span: float) -> tuple[Window, ...]:

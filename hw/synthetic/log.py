@@ -119,7 +119,7 @@ def _angles(plant: Plant, sensors: Sensors, random: np.random.Generator) -> Floa
 
 
 def _touch(force: Floats, sensors: Sensors, period: float, random: np.random.Generator) -> Floats:
-    """First-order lag of a force that holds between ticks, exact: y_k = c y_k-1 + (1 - c) f_k-1, c = e^(-ks T)."""
+    """First-order lag of a force held between ticks, exact: y_k = c y_k-1 + (1 - c) f_k-1, c = e^(-ks T)."""
     c = math.exp(-sensors.touch_rate * period)
     y = lfilter([0.0, 1.0 - c], [1.0, -c], force, axis=0)
     y = y + sensors.touch_noise * random.standard_normal(y.shape)

@@ -1,4 +1,4 @@
-"""The plant of synthetic logs of the delta rig: MuJoCo, under the rig's sampled control. It is no measurement."""
+"""The plant of synthetic logs of the delta rig: MuJoCo under the rig's sampled control; no measurement."""
 
 from __future__ import annotations
 

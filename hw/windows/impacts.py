@@ -1,4 +1,4 @@
-"""Impacts in sampled positions: when the acceleration jumps, how large the impulse is, and which belong together."""
+"""Impacts in sampled positions: when, how large the impulse is, and which belong together."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def impacts(t: Floats, y: Floats, least: float) -> Impacts:
 
 
 def least_of(t: Floats, y: Floats) -> float:
-    """An acceleration that only an impact of this measurement has, m/s^2: a part of the largest, above the noise."""
+    """An acceleration that only an impact has here, m/s^2: a part of the largest, above the noise."""
     if len(t) < 3:
         return np.inf
     acceleration = np.diff(np.diff(y) / np.diff(t)) / np.diff(0.5 * (t[1:] + t[:-1]))
@@ -57,7 +57,7 @@ def least_of(t: Floats, y: Floats) -> float:
 
 
 def matched(one: Impacts, other: Impacts) -> tuple[Floats, Floats]:
-    """Offsets in time (k,), s, and in the change of rate (k,), m/s, of impacts that belong together: other less one."""
+    """Offsets in time (k,), s, and in the change of rate (k,), m/s, of impacts that belong together."""
     if not len(one.t) or not len(other.t):
         return np.zeros(0), np.zeros(0)
     apart = other.t[None, :] - one.t[:, None]

@@ -13,7 +13,7 @@ from crossbody.reference import System
 Array = NDArray[np.complex128]
 SINGULAR = 1e-12  # singular value of the rows, over the largest, that holds nothing
 POLISH = 2
-"""Newton steps from a closed start: one carries a complex step on, the other what rounding left of the real part."""
+"""Newton steps from a closed start: one carries a complex step on, the other rounding of the real part."""
 
 
 def check_measured(system: System, seen: tuple[int, ...], name: str) -> None:

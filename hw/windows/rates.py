@@ -62,7 +62,7 @@ def _places(width: int) -> Rows:
 def _fitted(
     t: Floats, y: Floats, rows: Rows, width: int, degree: int, place: int, noise: Floats, limit: float
 ) -> tuple[Floats, Floats]:
-    """Rates (m, k) of polynomials, and how much more than noise they leave (m,): at most 1 if they explain it."""
+    """Rates (m, k) of polynomials, and how much more than noise they leave (m,): at most 1 if they fit."""
     at, span, powers, inverse, which = _polynomials(t, rows, place, width, degree)
     coefficients = np.einsum("nij,njk->nik", inverse[which], y[at])
     off = (y[at] - np.einsum("nji,nik->njk", powers[which], coefficients)) / noise
@@ -121,7 +121,7 @@ def derivatives(
 
 
 def _weights(t: Floats, half: int, degree: int, rows: Rows) -> tuple[Rows, Floats, Floats]:
-    """Samples of every polynomial (m, w), their span (m,), s, and what makes coefficients of them (m, 3, w)."""
+    """Samples of every polynomial (m, w), their span (m,), s, and their map to coefficients (m, 3, w)."""
     at, span, _, inverse, which = _polynomials(t, rows, half, 2 * half + 1, degree)
     return at, span, inverse[:, :3, :][which]
 

@@ -63,7 +63,7 @@ def way(y: Floats, turns: Sequence[int] = ()) -> Floats:
 
 
 def advanced(y: Floats, yd: Floats, delay: Floats, turns: Sequence[int] = ()) -> Floats:
-    """One state (k,) a little later, by its rates; turns by their angular velocity in the axes of the body."""
+    """One state (k,) a little later, by its rates; turns by their angular velocity in body axes."""
     found = y + yd * delay
     for i in turns:
         part = slice(i, i + 3)

@@ -26,7 +26,7 @@ BAND = 2.5758293035489004  # quantile of the normal distribution for 99 %, two-s
 LAGS = 25
 ORDER = 5  # of the autoregression that whitens an input
 OVERSAMPLED = 12.0
-"""Averages of a residual for each period of the motion's mean frequency: harmonics up to the sixth are told."""
+"""Averages of a residual a period of the motion's mean frequency: harmonics up to the sixth are told."""
 FEWEST = 8  # averages of a window
 BLOCK = 50  # samples over which the noise is looked at together
 FOURTH = np.sqrt(70.0)  # size of the fourth differences of white noise of size 1
@@ -52,7 +52,7 @@ class Correlation:
 
     @property
     def inside(self) -> float:
-        """Part of the lags, 0 to 1, that lies within the band; lag 0 of a residual with itself not counted."""
+        """Part of the lags, 0 to 1, within the band; lag 0 of a residual with itself not counted."""
         own = np.abs(self.values[self.lags != 0]) if self.values[self.lags == 0].tolist() == [1.0] else self.values
         return float(np.mean(np.abs(own) <= self.band))
 

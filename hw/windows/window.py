@@ -124,7 +124,7 @@ def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:
 
 
 def _behind_impacts(t: Floats, y: Floats, cuts: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """The same windows, but for starts that stand beside an impact; a window too short for that stays as it is."""
+    """The same windows, but for starts that stand beside an impact; one too short for that stays."""
     hits = impacts(t, y, least_of(t, y)).t
     beside = np.zeros(len(t), dtype=bool)
     for row in np.searchsorted(t, hits):
@@ -150,7 +150,7 @@ def _window(log: Log, y: Floats, yd: Floats, u: Floats, delays: Floats, turns: S
 
 
 def overlap(cut: Sequence[Window]) -> int:
-    """How many of the windows behind it a window has samples in common with, at most; other logs begin anew."""
+    """How many of the windows behind it a window has samples in common with at most; logs begin anew."""
     found = 0
     for i, window in enumerate(cut):
         count, last = 0, window.t[0]

@@ -31,7 +31,7 @@ EXPLAINED = 1e-4
 """What a known property may leave unexplained of the slope: one-sided differences have six digits or five."""
 TOGETHER = 1e-2  # distance of poles that count as one cluster, as a part of their modulus
 SLOW = 1e-3
-"""Part of the fastest pole below which a modulus does not count as a scale; 1e-9 of the largest row likewise."""
+"""Part of the fastest pole below which a modulus does not count as a scale; and part of the largest row."""
 
 
 NO_FRICTION = {

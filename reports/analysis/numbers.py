@@ -22,7 +22,7 @@ RANKS = ("place", "states", "controllable", "observable", "growth")
 REFUSALS = ("place", "why")
 COEFFICIENTS = ("place", "axis", "s^2", "s", "1", "coupling")
 ALIKE = 1e-6
-"""Part of the largest participation by which others are as large: places and speeds take part alike in what swings."""
+"""Part of the largest participation by which others are as large: places and speeds take part alike."""
 RESPONSES = ("place", "input", "output", "omega", "magnitude", "phase")
 
 
@@ -41,7 +41,7 @@ def equilibria(found: Sequence[Place], case: Case) -> pd.DataFrame:
 
 
 def poles(found: Sequence[Place]) -> pd.DataFrame:
-    """One row a pole; `led_by` is the state that takes part in it most, of such that do so alike the first."""
+    """One row a pole; `led_by` is the state that takes part in it most, of equals the first."""
     rows = []
     for place in found:
         if place.model is None:
@@ -60,7 +60,7 @@ def _leader(participation: Floats) -> int:
 
 
 def ranks(found: Sequence[Place]) -> pd.DataFrame:
-    """States, how many the inputs reach and the outputs show, and the largest real part, 1/s: one row a place."""
+    """States, those that inputs reach and outputs show, and the largest real part, 1/s: one row a place."""
     rows = []
     for place in found:
         if place.model is None:

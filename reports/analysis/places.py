@@ -57,7 +57,7 @@ class Place:
 
     @property
     def spot(self) -> Spot | None:
-        """Where an engine has to linearise; None where there is nothing, or what no engine has: a loop, friction."""
+        """Where an engine has to linearise; None where there is nothing, or what no engine has."""
         if self.model is None or self.controlled or self.system.frictional:
             return None
         found = self.trim
@@ -117,7 +117,7 @@ def _place(
 
 
 def _delta(case: Case, at: Mapping[str, float]) -> list[Place]:
-    """Held by constant torques; where its servos end, if they move; its feedback loop, if it has a controller."""
+    """Held by constant torques; where moving servos end; in its loop, if it has a controller."""
     robot = scene.robot_of(case.parameters)
     q = case.q0
     if at:
@@ -166,7 +166,7 @@ def _maze(case: Case, at: Mapping[str, float]) -> list[Place]:
 
 
 def _solid(case: Case, ring: int) -> float:
-    """An angle of the maze at which a ring is solid at top and bottom: half a gap's spacing beside its gaps."""
+    """An angle of the maze at which a ring is solid at top and bottom: half a spacing beside its gaps."""
     gaps, phase = int(case.number(f"gaps{ring}")), np.radians(case.number(f"phase{ring}"))
     spacing = 2.0 * np.pi / max(gaps, 1)
     angles = np.linspace(0.0, spacing, 97)[:-1]
@@ -209,7 +209,7 @@ def _chain(case: Case, at: Mapping[str, float]) -> list[Place]:
 
 
 def _visited(case: Case, at: Mapping[str, float]) -> list[Place]:
-    """In every set of rows that are on: where a run moves least, or, where some of them slide, does so fastest."""
+    """In every set of rows that are on: where a run moves least, or most where some slide."""
     from crossbody import engines
 
     run, system = engines.load("reference").prepare(case, "compiled").run(), build(case)
@@ -226,7 +226,7 @@ def _visited(case: Case, at: Mapping[str, float]) -> list[Place]:
 
 
 def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int, bool]) -> Place:
-    """Sample k of a run, with these rows on and some of them sliding: the equilibrium beside it if there may be one."""
+    """Sample k of a run, with these rows on and some sliding: the equilibrium beside it, if any."""
     sliding, t = [i for i, slides in rows.items() if slides], float(run.t[k])
     one_way = [i for i in rows if case.law.unilateral[i]]
     sticks = [case.contacts[i] for i in one_way if system.tangents[i] and not rows[i]]

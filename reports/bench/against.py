@@ -1,4 +1,4 @@
-"""A benchmark against an earlier one: what has become less accurate, and which lead over an engine was lost."""
+"""A benchmark against an earlier one: what has become less accurate, and which lead was lost."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ def _measured(metric: str, truth: Truth, run: Trajectory, case: Case) -> float:
 
 
 def known_to(case: Case, truth: Truth) -> float:
-    """How far a truth of two integrators can be trusted: their difference, as in `error`; 0 for a closed form."""
+    """How far two integrators' truth can be trusted: their difference, as in `error`; 0 for a closed form."""
     if case.closed_form is not None:
         return 0.0
     times = truth.agreement.get("event_times", 0.0) / case.t_end

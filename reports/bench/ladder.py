@@ -16,7 +16,7 @@ LADDERS = {
     "dt": (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4),
 }
 GROWTH = 3.0
-"""At most this many times what the last rung took is expected of the next: a run that failed early tells nothing."""
+"""At most this many times what the last rung took is expected of the next: early failures tell nothing."""
 PATIENCE = 2.0  # a rung may take this many times the longest; its steps are bounded accordingly
 
 

@@ -12,7 +12,7 @@ FLOOR = 1e-13  # errors below this are rounding: no order is fitted there
 EXACT = 1e-11
 """Where no error is above this there is nothing left to converge: closed forms, straight lines."""
 NEAR = 10.0
-"""Errors within this factor of the smallest are near its floor (rounding, another law): no order is fitted there."""
+"""Errors within this factor of the smallest are near its floor (rounding, another law)."""
 SLACK = 0.5
 """How far below its promise an order may be seen: events at random places in a step scatter the errors."""
 CONVERGES = 0.5
@@ -29,7 +29,7 @@ def observed_order(settings: Sequence[float], errors: Sequence[float]) -> float:
 
 
 def before_floor(settings: Sequence[float], errors: Sequence[float]) -> float:
-    """The order where the error is still well above the smallest that is reached, NaN below three such points."""
+    """The order where the error is still well above the smallest reached, NaN below three such points."""
     y = np.asarray(errors, dtype=np.float64)
     finite = y[np.isfinite(y)]
     if not len(finite):

@@ -1,4 +1,4 @@
-"""Many runs at once: the compiled reference in threads beside MuJoCo's own batch stepping on the same cores."""
+"""Many runs at once: the compiled reference in threads beside MuJoCo's batch stepping on the same cores."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RTOL = 1e-9
 STEP = 1e-3  # of MuJoCo, s
 RUNS, BATCH = 4000, 200  # runs of the reference, and of MuJoCo, whose are slower
 PAIR_RUNS, PAIRS = 1500, 4
-"""Runs on one core and on two, and such pairs for each repeat: short ones find a moment with two free cores."""
+"""Runs on one core and on two, and such pairs for each repeat: short ones find two free cores."""
 LEAST_RATIO, LEAST_TWO = 40.0, 1.7
 SPINNING = 1.9
 """Two threads that only count must be given this many cores, or the machine has no second one to give."""

@@ -1,4 +1,4 @@
-"""What `crossbody analyse` and `bode` do: find equilibria, linearise, show tables, write them with their figures."""
+"""What `crossbody analyse` and `bode` do: equilibria, linear models, tables, figures."""
 
 from __future__ import annotations
 

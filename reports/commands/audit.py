@@ -1,4 +1,4 @@
-"""What `crossbody audit` does: a robot file through every importer, told as a table, and what is wrong beneath it."""
+"""What `crossbody audit` does: a robot file through every importer, as a table, what is wrong beneath."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def _say(text: str) -> None:
 
 
 def table(rows: Sequence[Row], columns: int = WIDTH) -> list[str]:
-    """Return lines of so many columns: quantities down, engines across, one table below another where they are many."""
+    """Return lines of so many columns: quantities down, engines across, in several tables if need be."""
     lines, made = told.grid(rows), list[str]()
     most = max((columns - FIRST) // COLUMN, 1)
     for k in range(1, len(lines[0]), most):

@@ -22,7 +22,7 @@ off is chance, and moves tenfold with the last digit; the largest of three does 
 
 
 def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations, float]]:
-    """What all engines that are installed give on one variant, the largest near their tolerances, and up to when."""
+    """What all installed engines give on one variant, the largest near their tolerances, and up to when."""
     (case,) = choice.load_cases([name], variant, {})
     wanted = choice.picks(engines.names())
     result = jobs.run_case(case, wanted, tell=print, refine=False)
@@ -43,7 +43,7 @@ def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviati
 
 
 def _known(case: Case, entry: Entry) -> frozenset[str]:
-    """Metrics that a known property explains, by half to twice what is stored: there the run's own number stands."""
+    """Metrics that a known property explains, by half to twice what is stored: the run's own stands."""
     limits = limits_of(case)
     named = {limit.metric for limit in limits}
     found = {name: limit_for(limits, name, entry.engine, entry.profile) for name in named}

@@ -1,4 +1,4 @@
-"""The commands `crossbody warm` and `cache`: code that is compiled ahead; where it is kept, and how it is removed."""
+"""The commands `crossbody warm` and `cache`: compiling ahead; where code is kept, and its removal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `crossbody conformance` does: every feature of the table through every importer, as a page and tables."""
+"""What `crossbody conformance` does: all features through all importers, as a page and tables."""
 
 from __future__ import annotations
 

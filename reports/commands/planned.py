@@ -1,4 +1,4 @@
-"""What `run --dry-run` prints: every case and engine that would be run, with the settings that it would have."""
+"""What `run --dry-run` prints: every case and engine that would be run, with its settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `crossbody replay` and `crossbody identify` do: read the log, run, write tables and pages, show the metrics."""
+"""What `crossbody replay` and `crossbody identify` do: read, run, write tables and pages, show metrics."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 
 GRACE = 2.0
-"""Times the limit on an identification after which its process is ended: it stops by itself between two runs."""
+"""Times the limit on an identification after which its process is ended: it stops itself between runs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,7 +111,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
 
 
 def _identity(ask: Ask, log: Log, kind: str, wanted: Sequence[str]) -> dict[str, Any]:
-    """What decides what a replay predicts: the numbers of the log, the model and its source, engines and windows."""
+    """What decides what a replay predicts: the log's numbers, the model and its source, engines, windows."""
     return identity(
         f"replay {kind}", (), (), log=asdict(log.provenance), model=ask.model,
         source=kept.source(hw.models.load(ask.model)), pairs=ask.pairs,
@@ -194,7 +194,7 @@ def estimates(fit: Fit) -> pd.DataFrame:
 
 
 def held_out(fit: Fit) -> pd.DataFrame:
-    """One row a kind of error: with the parameters at the start and with the estimates, fitted windows and others."""
+    """One row a kind of error: at the start and with the estimates, fitted windows and others."""
     return pd.DataFrame(
         {
             "error": name, "fitted_before": fit.before[name][0], "fitted_after": fit.after[name][0],

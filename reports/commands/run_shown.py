@@ -70,7 +70,7 @@ def show_time(clock: Sequence[float], times: Times) -> None:
 
 
 def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
-    """Lay out a line a run below the name of its case; columns that say nothing, or do not fit, are left out."""
+    """Lay out a line a run below the name of its case; columns that say nothing or do not fit are out."""
     runs = [run for run in runs if (run.label, run.who) in times or not run.skipped]
     columns = {name: [_error(run, metric) for run in runs] for name, metric in SHOWN.items()}
     walls = [times.get((run.label, run.who), (None, None)) for run in runs]

@@ -1,4 +1,4 @@
-"""What commands share: what decides their result, how their tables are written and shown, and where their report is."""
+"""What commands share: what decides their result, how tables are written and shown, where the report is."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.store import STRESS, SWEEP, Store, identity
 
 LEAST, MOST, CHUNKS = 4, 100, 400
-"""Runs in a chunk, and how many chunks a sweep is cut into if they allow it; not a matter of the number of workers."""
+"""Runs in a chunk, and chunks that a sweep is cut into if they allow it, whatever the number of workers."""
 SHOWN = 12
 
 

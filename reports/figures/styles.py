@@ -1,4 +1,4 @@
-"""How an engine looks in every plot, table and picture of a case, and how plotly is told texts, arrays and axes."""
+"""How an engine looks in plots, tables and pictures, and how plotly is told texts, arrays and axes."""
 
 from __future__ import annotations
 

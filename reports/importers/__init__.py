@@ -1,1 +1,1 @@
-"""What engines' own readers make of robot files: the audit of one file, the table of features, causes and rewrites."""
+"""What engines' own readers make of robot files: audit of a file, table of features, causes, rewrites."""

@@ -31,7 +31,7 @@ from crossbody.reports.importers.lines import named as lines_named
 from crossbody.reports.importers.solids import SINGLE
 
 FIRST, BEHIND = "mujoco", 5
-"""Reader whose answer is to be there first, as the other yardstick, and how much nicer the others are to it and us."""
+"""Reader whose answer is to come first, as the other yardstick, and how nice the others are to it and us."""
 
 
 @dataclass(slots=True)
@@ -166,7 +166,7 @@ def opened(path: Path, without: str = "", job: dict[str, Any] | None = None) -> 
 
 
 def with_closed_forms(scene: Scene, own: Mapping[str, Inertia | None]) -> Scene:
-    """Return the scene with inertias of shapes as we compute them: what the compiler makes of them is seen then."""
+    """Return the scene with inertias of shapes as we compute them: what the compiler makes of them shows."""
 
     def of(body: Body) -> Body:
         inertia = own.get(body.name)
@@ -182,7 +182,7 @@ def of_scene(
     findings: tuple[str, ...] = (), touching: Sequence[str] | None = None,
     job: dict[str, Any] | None = None,
 ) -> Audit:  # fmt: skip
-    """Return the audit of a file of which a scene says what it means; without `touching` shapes are not compared."""
+    """Return the audit of a file by the scene that it means; without `touching` shapes are not compared."""
     own = job_of(scene, keys)
     job = job if job is not None and job["joints"] == own["joints"] else own
     return Audit(path=path, scene=scene, job=job, wanted=expected(scene, job, touching), findings=findings)

@@ -1,4 +1,4 @@
-"""Why a reader makes something else of a file: features that it fails in the table, tried by leaving them out."""
+"""Why a reader makes something else of a file: features that it fails, tried by leaving them out."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def uses(path: Path, urdf: bool) -> list[Use]:
 
 
 def _at(root: Node, places: Mapping[Node, Place], way: str) -> list[Node]:
-    """Return the elements at a path of ElementTree; behind a ! stands what they must not have, = what stands for it."""
+    """Return the elements at a path; behind a ! stands what they must not have, = what stands for it."""
     if way == ".//include":
         return [node for node in places if node.tag == "include"]
     path, _, without = way.partition("!")
@@ -183,7 +183,7 @@ def _of_engine(engine: str, trials: _Trials, used: Sequence[Use], off: Sequence[
 
 
 def _pairs(row: Row, engine: str, trials: _Trials, near: Sequence[Use]) -> list[tuple[Use, ...]]:
-    """Return pairs of features without which an importer agrees, of those that are nearest to where it does not."""
+    """Return pairs of features without which an importer agrees, nearest to where it does not."""
     places = _places(row)
     tried = sorted(near, key=lambda use: not use.at(places))[:PAIRED]
     pairs = list(combinations(tried, 2))
@@ -232,7 +232,7 @@ def _places(row: Row) -> list[str]:
 
 
 def _blamed(row: Row, causes: Sequence[tuple[Use, ...]], doubt: str) -> Row:
-    """Return a row with its cause: of several that which is used at the joint or body, and in the fewest places."""
+    """Return a row with its cause: of several the one at the joint or body, in the fewest places."""
     places = _places(row)
     cause = min(causes, key=lambda group: (not any(use.at(places) for use in group), sum(len(u.places) for u in group)))
     file, line = next((place for use in cause for place in use.at(places)), cause[0].places[0])
@@ -247,7 +247,7 @@ def parts(cause: str) -> list[str]:
 
 
 def advice(cause: str) -> str:
-    """Return rules of the format and rewrites that stand behind a cause; empty where it is none of the table."""
+    """Return the format's rules and rewrites behind a cause; empty where it is none of the table."""
     named = [feature for feature in FEATURES if feature.name in parts(cause)]
     told = [" ".join(filter(None, (one.rule, one.rewrite))) for one in named]
     return " ".join(dict.fromkeys(filter(None, told))) or TELLS if named else ""

@@ -185,7 +185,7 @@ def _numbers(gap: Gap) -> dict[str, Any]:
 def gaps(
     found: Mapping[str, Any], wanted: Mapping[str, Any], joints: Sequence[Sequence[str]]
 ) -> Iterator[tuple[str, Sequence[Gap] | None]]:
-    """Yield quantities in their order; None where the file has nothing of it, or where it cannot be compared."""
+    """Yield quantities in their order; None where the file has nothing of it, or it cannot be compared."""
     off = [*((name, "missing") for name in found["missing"]), *((name, "more") for name in found["extra"])]
     count = len(joints)
     here = count - len(found["missing"]) + len(found["extra"])

@@ -1,4 +1,4 @@
-"""What an engine says that it leaves out of a file: of its consequences it is held to the file without that."""
+"""What an engine says that it leaves out: of its consequences it is held to the file without that."""
 
 from __future__ import annotations
 

@@ -120,7 +120,7 @@ WORLD = [[0.0] * 3, np.eye(3).tolist()]
 
 
 def _ends(scene: Scene, frames: Any) -> list[Any]:
-    """Return of every loop the two frames whose origins or which it holds together; of coupled joints none."""
+    """Return of each loop the frames whose origins or which it holds together; of coupled joints none."""
     told = []
     for loop in scene.loops:
         sides = ((loop.first, loop.first_position, loop.orientation), (loop.second, loop.second_position, UPRIGHT))

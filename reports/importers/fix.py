@@ -1,4 +1,4 @@
-"""A robot file written so that more readers agree; what it means stays, which is checked before it is written."""
+"""A robot file written so that more readers agree; what it means stays, which is checked first."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _check(before: Audit, after: Audit, path: Path) -> None:
 
 
 def urdf(path: Path, out: Path) -> Node:
-    """Return a URDF with axes of length 1, inertias in the axes of their links, and meshes by where they are."""
+    """Return a URDF with axes of length 1, inertias in the axes of their links, meshes by where they are."""
     root = parsed(path)
     meshes = root.findall(".//mesh[@filename]")
     for mesh in meshes:

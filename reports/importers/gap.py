@@ -1,4 +1,4 @@
-"""A difference between what an importer has made of a file and what the file says, and what it is measured by."""
+"""How what an importer has made of a file differs from what it says, and what it is measured by."""
 
 from __future__ import annotations
 

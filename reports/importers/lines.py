@@ -1,4 +1,4 @@
-"""Where the elements of a robot file stand: which file, of it and of those that it includes, and which line."""
+"""Where the elements of a robot file stand: in which file, of those that it includes too, and line."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def with_lines(path: Path, folder: Path | None = None) -> tuple[Node, dict[Node,
 
 
 def files_of(path: Path) -> set[Path]:
-    """Return the files that a robot file is made of: itself, what it includes, and what its parts name as a file."""
+    """Return the files that a robot file is made of: itself, what it includes, what its parts name."""
     try:
         root, places = with_lines(path)
     except expat.ExpatError:
@@ -56,7 +56,7 @@ def files_of(path: Path) -> set[Path]:
 
 
 def names(node: Node, around: Mapping[Node, Node]) -> set[str]:
-    """Return the names of a part, of its children, of what it speaks of and of the body that it belongs to."""
+    """Return the names of a part, of its children, of what it speaks of and of its body."""
     own = {node, *node}
     if node.tag not in ("body", "link") and node in around and around[node].tag in ("body", "link", "joint"):
         own |= {around[node], *around[node]}

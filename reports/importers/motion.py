@@ -12,9 +12,9 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports.importers.gap import Gap, lacks, reach
 
 FLOOR = 1e-4
-"""Part of the largest force that is the scale of the smallest ones: rounding is that of the sums they stand in."""
+"""Part of the largest force that is the scale of the smallest ones: rounding is that of their sums."""
 ROUNDED = 1e-6
-"""Part of the reach of a robot below which lengths have lost digits: what is far out is rounded as it is far."""
+"""Part of the reach of a robot below which lengths have lost digits: what is far out is rounded so."""
 STANDARD = 9.81  # gravity, m/s^2
 
 
@@ -36,7 +36,7 @@ def _armature(answer: Mapping[str, Any], names: Sequence[str]) -> Floats:
 
 
 def states(answer: Mapping[str, Any], key: str, names: Sequence[str]) -> Floats | None:
-    """Return a quantity at all states, M without what joints add to it; None where there is nothing to see."""
+    """Return a quantity at all states, M without what joints add to it; None where there is none."""
     if lacks(answer, key):
         return None
     found = np.array([state[key] for state in answer["states"]])
@@ -58,7 +58,7 @@ def matrix(found: Floats | None, wanted: Floats | None, names: Sequence[str], fl
 
 
 def moved(wanted: Mapping[str, Any], M: Floats | None) -> float:
-    """Return the size of the sums that forces are, where these cancel: weights far out, and what velocities make."""
+    """Return the size of sums that forces are, where they cancel: weights far out, what velocities make."""
     v = np.array([state["v"] for state in wanted["states"]])
     weights: float = (
         STANDARD * sum(abs(inertia[0]) for inertia in wanted["inertias"].values()) * reach(wanted["states"])

@@ -22,7 +22,7 @@ USUAL = {"lower": -math.inf, "upper": math.inf, "least force": -math.inf, "most 
 
 
 def numbers(quantity: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
-    """Every number of every joint that either has; one of an engine's stands for all velocities of a joint."""
+    """Every number of every joint that either has; an engine's one stands for all velocities."""
     told, some = [], False
     for key in NUMBERS[quantity]:
         usual = USUAL.get(key, 0.0)
@@ -57,7 +57,7 @@ def tendons(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | 
 
 
 def loops(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
-    """Each loop of the file beside the one of the same type that is nearest: what it holds together, or couples."""
+    """Each loop of the file beside the one of the same type nearest to it: what it holds or couples."""
     mine, theirs = found["loops"], wanted["loops"]
     if not mine and not theirs:
         return None
@@ -79,7 +79,7 @@ def loops(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | No
 
 
 def _held_apart(found: Mapping[str, Any], i: int, wanted: Mapping[str, Any], k: int) -> float:
-    """Return how far two loops of one type are from each other, of the reach of the robot or of their numbers."""
+    """Return how far two loops of one type are from each other, of the robot's reach or of their numbers."""
     kind, of, numbers = wanted["loops"][k]
     _, named, others = found["loops"][i]
     if kind in ("joint", "tendon"):

@@ -101,7 +101,7 @@ class _Rewriting:
 
 
 def merged(above: dict[str, str], own: Any) -> dict[str, str]:
-    """Return attributes with those of a class beneath; an orientation, and where something is, are each said once."""
+    """Return attributes with those of a class beneath; orientation and place are each said once."""
     left = dict(above)
     if any(key in own for key in TURNS):
         left = {key: value for key, value in left.items() if key not in TURNS}
@@ -109,7 +109,7 @@ def merged(above: dict[str, str], own: Any) -> dict[str, str]:
 
 
 def _completed(own: str, above: str) -> str:
-    """Return numbers with those of a class behind them, where they are fewer: what the compiler makes of them."""
+    """Return numbers with those of a class behind them, where they are fewer, as the compiler has them."""
     mine, theirs = own.split(), above.split()
     try:
         numbers = [float(word) for word in (*mine, *theirs)]
@@ -202,7 +202,7 @@ def mjcf(path: Path, out: Path) -> Node:
 
 
 def _say_bodies(root: Node, model: Any) -> None:
-    """Write the inertias and joints as they were compiled: both count their bodies in the order of the file."""
+    """Write inertias and joints as they were compiled: both count their bodies in the order of the file."""
     bodies = [body for world in root.findall("worldbody") for body in world.iter("body")]
     joints = [joint for body in bodies for joint in body if joint.tag in ("joint", "freejoint")]
     if len(bodies) != model.nbody - 1 or len(joints) != model.njnt:
@@ -243,7 +243,7 @@ def _say_joint(joint: Node, model: Any, i: int) -> None:
 
 
 def _say_options(root: Node, path: Path, out: Path) -> None:
-    """Say angles in radians, and what is left to say of the compiler; name the model; write gravity that is off."""
+    """Say angles in radians, and the rest of the compiler; name the model; write gravity that is off."""
     root.set("model", root.get("model") or path.stem)
     settings: dict[str, str] = {}
     for one in root.findall("compiler"):

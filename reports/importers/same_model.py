@@ -25,7 +25,7 @@ KEPT = (
 )  # fmt: skip
 """Of the compiled model: what the rewriting must not touch."""
 STATES, LIKE = 3, 1e-7
-"""States at which places are compared, and how far they may be apart, m; sizes of meshes have single precision."""
+"""States at which places are compared, and how far they may be apart, m; meshes have single precision."""
 SPHERE, BOX, ROUND = 2, 6, (0, 3, 5)
 """Types of shapes: those in ROUND (plane, capsule, cylinder) are the same however turned about their axis."""
 
@@ -43,7 +43,7 @@ def check_model(path: Path, half: Path) -> None:
 
 
 def _placed(model: Any) -> Iterator[tuple[str, Floats]]:
-    """Yield where shapes, sites, cameras and lights are, and what sensors say, at states that are always the same."""
+    """Yield where shapes, sites, cameras and lights are, and what sensors say, at fixed states."""
     import mujoco
 
     data, rng = mujoco.MjData(model), np.random.default_rng(0)

@@ -11,7 +11,7 @@ import numpy as np
 from crossbody.reports.importers.gap import Gap, apart, lacks, reach
 
 SINGLE = 1e-6
-"""Part of the reach within which corners of meshes are the same: files and engines have them in single precision."""
+"""Part of the reach within which corners of meshes are the same: both have them in single precision."""
 
 
 def matched(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[int, tuple[int, float]]:
@@ -65,7 +65,7 @@ def contacts(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[in
 
 
 PARTS = ("slide", "slide", "spin", "roll", "roll", "margin")
-"""Of what is told of a pair that may touch: friction along two tangents, about the normal and about them, margin."""
+"""Of a pair that may touch: friction along two tangents, about the normal and about them, margin."""
 
 
 def surfaces(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[int, tuple[int, float]]) -> Any:

@@ -43,7 +43,7 @@ WAYS = {
 
 
 def verdict(rows: Sequence[Row]) -> str:
-    """Return in one sentence which engines read the robot that the file describes, and which do not, and in what."""
+    """Return in one sentence which engines read the robot of the file, and which do not, and in what."""
     of: dict[str, list[Row]] = {}
     for row in rows:
         of.setdefault(row.engine, []).append(row)

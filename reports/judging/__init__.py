@@ -1,1 +1,1 @@
-"""What decides a verdict: the truth of a case, comparison with it, the audit of the physics that reached an engine."""
+"""What decides a verdict: the truth of a case, comparison with it, the audit of an engine's physics."""

@@ -59,7 +59,7 @@ class Answers:
 
 
 def _places(known: Floats, times: Floats) -> NDArray[np.intp] | None:
-    """Return where instants stand among others, one asked for again behind itself; None if one is not there."""
+    """Return where instants stand among others, one asked again behind itself; None if one is not there."""
     again = np.zeros(len(times), dtype=np.intp)
     again[1:] = times[1:] == times[:-1]
     places = np.searchsorted(known, times, side="left") + again

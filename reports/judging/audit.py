@@ -93,7 +93,7 @@ def states(case: Case, theirs: Mapping[str, Any]) -> list[tuple[Floats, Floats]]
 
 
 def _entered(case: Case, gap: Any, H: Any, draw: np.random.Generator) -> tuple[Floats, Floats]:
-    """A state near the start with gaps and rates that are drawn below zero: by Newton, in the least change of q."""
+    """A state near the start with gaps and rates that are drawn below zero: by Newton, in least change."""
     wanted = -1e-2 * np.maximum(np.abs(gap(case.q0)), 1e-3) * draw.uniform(0.01, 1.0, len(case.law.a0))
     q: Floats = np.array(case.q0)
     for _ in range(NEWTON):

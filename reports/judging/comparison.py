@@ -131,7 +131,7 @@ def compare(
 
 
 def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> list[Verdict]:
-    """Every row of one case: those of every run, the truth's own, and a word on claims that judged nothing."""
+    """Every row of one case: of every run, the truth's own, and a word on claims that judged nothing."""
     check_names(case)
     truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
     trusted = shortened(truth)
@@ -232,7 +232,7 @@ class _Judge:
         self.command = f"{command} --engine {entry.engine}:{entry.profile}"
 
     def limit(self, metric: str) -> Limit | None:
-        """The limit that judges this run, the wider the more errors grow, as far as a fault of a per cent is seen."""
+        """The limit that judges this run, wider as errors grow, as far as a fault of a per cent shows."""
         found, grows = limit_for(self.limits, metric, self.entry.engine, self.entry.profile), self.truth.grows
         if found is None or metric not in GROWING or grows <= 1.0:
             return found
@@ -319,7 +319,7 @@ def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
 
 
 def _outcome(judge_: _Judge, run: Trajectory) -> Verdict:
-    """Whether the run reached its horizon: one that did not is outside with the advice, whatever it says of itself."""
+    """Whether the run reached its horizon: if not it is outside with the advice, whatever it says."""
     t_end = judge_.case.t_end
     end = float(run.t[-1]) if len(run.t) else 0.0
     if not run.outcome.ok:
@@ -333,7 +333,7 @@ def _outcome(judge_: _Judge, run: Trajectory) -> Verdict:
 
 
 def _defaults(judge_: _Judge) -> Iterator[Verdict]:
-    """An engine's own settings that are not those of the stored run: nothing that was stored judges it any more."""
+    """An engine's own settings that are not those of the stored run: nothing stored judges it any more."""
     was, now = defaults(judge_.case, judge_.entry), words(judge_.entry.settings)
     if judge_.entry.default and was and was != now:
         changed = ", ".join(sorted(set(was.split()) ^ set(now.split())))
@@ -378,7 +378,7 @@ def crash(error: Exception) -> str:
 
 
 def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict]:
-    """A row for every metric that says something; one that throws is a row too, so that the others are judged."""
+    """A row for every metric that says something; one that throws is a row too."""
     for name, metric in metrics.of(judge_.case).items():
         wanted = name in judge_.claims or judge_.limit(name) is not None
         if metric.CLAIMED and not wanted:
@@ -411,7 +411,7 @@ def _row(
 
 
 def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, case: Case) -> tuple[float | None, float]:
-    """The number, and the part of the horizon over which the truth was asked for it, or is trusted if it was not."""
+    """The number, and the part of the horizon over which the truth was asked for it, or is trusted."""
     until = [truth.trusted]
 
     def at(times: Floats) -> Trajectory:
@@ -423,7 +423,7 @@ def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, cas
 
 
 def _split(judge_: _Judge) -> Iterator[Verdict]:
-    """How much of the worst error is the importer's, the model's and the step's, and the largest of each anywhere."""
+    """How much of the worst error is importer's, model's and step's, and the largest of each anywhere."""
     entry = judge_.entry
     if entry.run is None or (entry.study is None and entry.own is None):
         return

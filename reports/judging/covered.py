@@ -1,4 +1,4 @@
-"""Whether a file's model covers its motion, found at its start and by cheap runs, before anything that takes long."""
+"""Whether a file's model covers its motion, found at its start and by cheap runs first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from crossbody.cases.files.contacts import Meeting, meeting
 from crossbody.reports.judging.reach import COARSE, motion
 
 LOOSE = 100.0
-"""Tolerance of a second run, in units of that of the first, which tells whether their motion is known so far."""
+"""Tolerance of a second run, in units of that of the first, which tells how far their motion is known."""
 SAME = 1e-3  # part of the time at which shapes meet by which two runs may be apart that know when
 
 

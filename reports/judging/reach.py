@@ -35,7 +35,7 @@ SHORT = {
 """Ends of the tightest run up to which a motion is compared all the same, and why not further."""
 BEFORE = 1e-6  # part of the time that such a run got to by which its horizon is shorter at least
 SHORTEST = 1e-3
-"""Part of its horizon to which a motion is cut at most: one that gets no further stands still at an instant."""
+"""Part of its horizon to which a motion is cut at most: one that gets no further stands still."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ def followed(case: Case, budget: float | None = None) -> Followed:
 
 
 def cut_short(case: Case, run: Trajectory) -> Case:
-    """Return a case whose horizon, of two digits, ends before a run did for a reason in `SHORT`; else as it is."""
+    """Return a case whose horizon, of two digits, ends before a run did by `SHORT`; else as it is."""
     reached = (1.0 - BEFORE) * float(run.t[-1]) if len(run.t) else 0.0
     if run.outcome not in SHORT or reached < SHORTEST * case.t_end:
         return case

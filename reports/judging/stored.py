@@ -45,7 +45,7 @@ def deviations(case: Case, entry: Entry, trusted: float) -> Deviations:
 
 
 def defaults(case: Case, entry: Entry) -> str:
-    """Settings, in words, that the engine had by itself in the stored run with the same parameters; empty without."""
+    """Settings, in words, that the engine had itself in the stored run of the same parameters; or none."""
     if math.isnan(compared_until(case)):
         return ""
     return str(_table()[case.label]["runs"].get(f"{entry.engine}:{entry.profile}", {}).get("settings", ""))

@@ -1,4 +1,4 @@
-"""Which runs are within all limits, which are off, by how much and by which part of their error: one sentence."""
+"""Which runs are within all limits, which are off, how much and by which part of the error: one sentence."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
 SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$)")
-"""What the row of a truth says of a horizon that is shorter than was asked for, or a motion that is known in part."""
+"""What a truth's row says of a horizon shorter than was asked for, or a motion known in part."""
 NAMED = 3  # runs that the sentence names
 
 
@@ -50,7 +50,7 @@ class EngineRun:
 
     @property
     def unbounded(self) -> Row | None:
-        """The number beyond its limit of which it is known that it may be, not how far: of position if there is one."""
+        """The number beyond its limit that may be so, unknown how far: of position if there is one."""
         loose = [row for row in self.rows if row["verdict"] == Word.INFO and (row["limit"] or 0.0) > 0.0]
         beyond = [row for row in loose if 1.0 < share(row) < math.inf]
         return max(beyond, key=lambda row: (row["metric"] == "position", share(row)), default=None)

@@ -25,15 +25,15 @@ from crossbody.reports.measuring.truth import Truth, before, sample_times, short
 SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 WITNESS = 100.0
-"""Tolerance of the witness that shares nothing but the scene, likewise: a run in Python, whose steps cost 1e3 more."""
+"""Tolerance of the witness that shares nothing but the scene, likewise: in Python steps cost 1e3 more."""
 OF_WITNESS, SHARE = 8.0, 0.05
 """Time that this witness may take, in budgets, by what it takes for the first part of the horizon, and that part."""
 NUDGE, DIRECTIONS, INSTANTS = 1e-7, 2, 201
-"""By how much of the largest velocity a start is put off, in how many directions, and when it is looked at."""
+"""By how much of the largest velocity a start is put off, in how many directions, and when it is seen."""
 PARTED = 1e-6
 """Difference of the two, over the largest coordinate, from which on neither is trusted."""
 STEPS, GROWTH = 1e4, 10.0
-"""Most steps of a run, whose errors add up at worst, and how much they grow where a motion is not declared chaotic."""
+"""Most steps of a run, whose errors may add up, and their growth if no chaos is declared."""
 AGREES = STEPS * GROWTH
 """Largest disagreement of the two, in units of the looser tolerance; it is never more than `PARTED`."""
 MULTIPLIED = 1e3
@@ -106,7 +106,7 @@ def law_of(case: Case) -> Truth | None:
 
 
 def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget: float = BUDGET) -> Truth:
-    """The compiled integrator at its tightest, held against another solver: tier C if that is independent, else D."""
+    """The compiled integrator at its tightest, held against another: tier C if independent, else D."""
     from crossbody.cases.scene_contacts import frictional
 
     @Answers
@@ -267,7 +267,7 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], 
 
 
 def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
-    """The truth with what a second source says of it: agreement, until when, and how fast they part if they do."""
+    """The truth with what a second source says of it: agreement, until when, how fast they part."""
     t, off = _apart(truth, second, case)
     parted = off > PARTED
     trusted = math.inf if second.outcome.ok else float(second.t[-1]) if len(second.t) else 0.0
@@ -293,7 +293,7 @@ def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats
 
 
 def _growth(t: Floats, off: Floats) -> float:
-    """Slope of ln(largest distance so far), 1/s, between rounding and the largest distance; infinite for a jump."""
+    """Slope of ln(largest distance so far), 1/s, between rounding and the largest; infinite for a jump."""
     worst = np.maximum.accumulate(off)
     rising = (worst > GROWN * np.finfo(float).eps) & (worst <= PARTED)
     if rising.sum() < 2 or np.ptp(t[rising]) == 0.0:

@@ -15,7 +15,7 @@ FACTOR = 2.0
 BAND = 10.0
 """A number that was right may become so many times what a stored run gave before it counts as lost."""
 ROUNDING = 1e-12
-"""Below this part of what is claimed, or of one unit of the metric, numbers differ from one machine to the next."""
+"""Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
 IDENTITIES = frozenset(
     {"start_error", "mode_residual", "event_gap", "largest position (importer)", "largest event_times (importer)"}
@@ -101,7 +101,7 @@ COLUMNS = {name: float if kind == "float" else str for name, kind in Verdict.__a
 
 
 def limit_for(limits: Sequence[Limit], metric: str, engine: str, profile: str) -> Limit | None:
-    """The limit that speaks most precisely of a run, of equals the last; with the property that shows in any metric."""
+    """The most precise limit of a run, of equals the last; with the property shown in any metric."""
 
     def precise(wanted: str) -> Limit | None:
         covering = [x for x in limits if x.metric == wanted and x.covers(engine, profile)]

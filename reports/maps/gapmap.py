@@ -25,10 +25,10 @@ from crossbody.reports.runs.choice import Pick
 LARGEST_S = 3.0
 MACHINES = ("level", "memoryless")
 BESIDE = tuple(rule for rule in RULES if rule not in ("block", "memoryless"))
-"""Rules whose own answer is laid beside; block gives what simultaneous does, memoryless is a line of its own."""
+"""Rules whose own answer is laid beside; block gives simultaneous, memoryless is its own line."""
 LONGER = 6  # how often the horizon is doubled while gaps still close
 TIE = 1e-6
-"""Rules no further apart than this are told apart by their order: with springs and gaps all give the ideal pattern."""
+"""Rules no further apart than this are taken in their order: with springs and gaps all are ideal."""
 PATTERN = "to_sequential"
 
 COLUMNS = (
@@ -60,7 +60,7 @@ def lines(picks: Iterable[Pick]) -> tuple[Line, ...]:
 
 
 def scene(n: int, s: float, machine: str, rule: str) -> Case:
-    """The sliders with a gap of s v/sqrt(a0); every contact integrated in real time, if the rule is "resolved"."""
+    """The sliders with a gap of s v/sqrt(a0); contacts integrated in real time if "resolved"."""
     plain = cases.load("newtons_cradle", "sliders", n=n)
     gap = s * plain.number("speed") / math.sqrt(plain.number("a0"))
     case = cases.load("newtons_cradle", "sliders", n=n, gap=gap, collisions=rule)
@@ -123,7 +123,7 @@ def _line(line: Line, n: int, values: Sequence[float]) -> Iterator[dict[str, Any
 
 
 def _run(line: Line, case: Case) -> tuple[Case, Trajectory, str]:
-    """The run with a horizon that lets every gap open, the case with that horizon, and the machine followed."""
+    """The run with a horizon that lets every gap open, that case, and the machine followed."""
     engine = engines.load(line.pick.engine)
     for _ in range(LONGER):
         prepared = engine.prepare(case, line.pick.profile)

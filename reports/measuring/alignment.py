@@ -25,7 +25,7 @@ _Pairs = list[tuple[Contact, Contact]]
 
 
 def matched(truth: Truth, run: Trajectory) -> _Pairs:
-    """Contacts of truth and run, paired in order up to the first that belongs to another row or is not trusted."""
+    """Contacts of truth and run, paired in order up to the first of another row or not trusted."""
     pairs: _Pairs = []
     for a, b in zip(*(contacts(each, truth.joined) for each in (truth.trajectory, run)), strict=False):
         if a.row != b.row or a.touch > truth.trusted:
@@ -35,7 +35,7 @@ def matched(truth: Truth, run: Trajectory) -> _Pairs:
 
 
 def turns(run: Trajectory) -> list[tuple[float, int, Mode]]:
-    """When rows begin to stick or to slip, or to slip another way, where lam jumps: instant, row, and mode behind."""
+    """When rows begin to stick or to slip, or another way, where lam jumps: instant, row, mode behind."""
     between = {Mode.STICK, Mode.SLIP}
     return sorted((e.t, e.contact, e.after) for e in run.events if {e.before, e.after} <= between)
 

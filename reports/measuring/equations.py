@@ -32,6 +32,6 @@ def finite(run: Trajectory) -> bool:
 
 
 def spread(run: Trajectory, among: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
-    """Indices of at most `SAMPLES` samples, evenly spread; of those that are true in `among` (n,), if it is given."""
+    """Indices of at most `SAMPLES` samples, evenly spread; of those true in `among` (n,), if given."""
     some = np.arange(len(run.t)) if among is None else np.flatnonzero(among)
     return some[:: -(-len(some) // SAMPLES) or 1]

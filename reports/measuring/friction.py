@@ -65,7 +65,7 @@ def rubbing(run: Trajectory, case: Case) -> Rubbing | None:
 
 
 def _pairs(case: Case, count: int) -> NDArray[np.intp]:
-    """Return which pair each place belongs to; each is one by itself in dry friction, and in equations of one's own."""
+    """Return which pair each place belongs to; each by itself in dry friction and in own equations."""
     met = contacts(case.scene) if case.general and case.scene is not None else ()
     found = [k for k, contact in enumerate(met) for _ in range(contact.places if contact.friction > 0.0 else 0)]
     dry = sum(width for _, width in case.scene.dry) if case.scene is not None else 0
@@ -73,14 +73,14 @@ def _pairs(case: Case, count: int) -> NDArray[np.intp]:
 
 
 def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """Return where places slide so that their slip has a direction (n, m), and speeds and forces (n, m), m/s and N."""
+    """Return where slip has a direction (n, m), and speeds and forces (n, m), m/s and N."""
     speed, force = np.linalg.norm(found.slip, axis=-1), np.linalg.norm(found.force, axis=-1)
     slides = (run.mode[:, found.rows] == Mode.SLIP) & (speed > SLOW * speed.max()) & (force > SLOW * force.max())
     return slides, speed, force
 
 
 def off_slip(run: Trajectory, case: Case) -> float:
-    """Return the largest difference of friction from -mu lam_n s, s along the slip, N; 0 where nothing slides."""
+    """Return how far friction is at most from -mu lam_n s, s along the slip, N; 0 where nothing slides."""
     found = rubbing(run, case)
     if found is None:
         return 0.0

@@ -15,7 +15,7 @@ SAME = 1e-7  # part of the horizon within which a sample and a collision are at 
 
 
 def away(exact: Trajectory, instants: Sequence[float], t_end: float) -> NDArray[np.bool_]:
-    """Samples of a truth (n,) that do not stand at one of the instants, where a sample does not say on which side."""
+    """Samples of a truth (n,) not at one of the instants, where a sample does not say on which side."""
     nearest = [np.abs(exact.t - t) for t in instants]
     return np.min(nearest, axis=0) > SAME * t_end if nearest else np.ones(len(exact.t), dtype=bool)
 

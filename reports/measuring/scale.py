@@ -1,4 +1,4 @@
-"""What errors are measured by: of a coordinate the largest of its own motion, or of its like where it rests."""
+"""What errors are measured by: of a coordinate its own largest, or of its like where it rests."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ absolute tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of thi
 
 
 IDLE = 1e-3
-"""Part of the forces that move a mechanism below which its rows carry nothing: their multipliers are noise."""
+"""Part of the forces that move a mechanism below which its rows carry nothing but noise."""
 KNOWN = 1e-8
-"""Part of an energy that must move for what it is off by to be measured: rounding of the rest is 1e-7 of that."""
+"""Part of an energy that must move to measure what it is off by: rounding of the rest is 1e-7 of it."""
 
 
 def energy(run: Trajectory) -> float:

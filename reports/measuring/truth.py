@@ -16,7 +16,7 @@ from crossbody.cases.trajectory import Ledger
 
 TRUTH = "truth"  # name of the truth where engines have theirs, and of the row that judges it
 LAST = 0.9
-"""Part of the time for which a truth is trusted behind which it may end, so that this is between two events."""
+"""Part of the time for which a truth is trusted behind which it may end, between two events."""
 MOST, FEWEST = 4000, 21
 """Samples inside all short intervals between events together, unless each has but the fewest."""
 
@@ -86,7 +86,7 @@ def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 
 
 
 def shortened(truth: Truth) -> Truth:
-    """Return a truth that ends where it is no longer trusted, between two events: there numbers of events can agree."""
+    """Return a truth up to where it is trusted, between two events, so that numbers of them can agree."""
     end = truth.trusted
     if not end < truth.trajectory.t[-1]:
         return truth

@@ -1,4 +1,4 @@
-"""What has changed between two sets of verdicts: words first, then values by how much of their limit they moved."""
+"""What has changed between two sets of verdicts: words first, then values by how far they moved."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def moves(rows: Iterator[Row]) -> list[dict[str, Any]]:
 
 
 def _share(row: Row) -> float:
-    """By how much of its limit a value moved; infinite where the limit is 0, nothing where there is no number."""
+    """By how much of its limit a value moved; infinite where that is 0, nothing without numbers."""
     value, before, limit = (row[name] for name in ("value", "value_before", "limit"))
     if value is None or before is None or limit is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""The figures of a case's page; every axis has its unit, every line belongs to an engine that can be hidden."""
+"""The figures of a case's page; every axis has its unit, every line an engine that can be hidden."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def points_for(traces: Sequence[Trace], room: float) -> int:
 
 
 def floor_of(truth: Floats) -> float:
-    """Below this a difference is rounding: the largest value times 2.2e-16, rounded down to a power of ten."""
+    """Below this a difference is rounding: the largest value times 2.2e-16, down to a power of ten."""
     largest = float(np.max(np.abs(truth[np.isfinite(truth)]), initial=0.0))
     return float(10.0 ** np.floor(np.log10(largest * np.finfo(float).eps))) if largest > 0.0 else 1e-17
 
@@ -133,7 +133,7 @@ def carrying(traces: Sequence[Trace]) -> list[int]:
 
 
 def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, str]:
-    """Return the ends of a plot of one contact's force where some run goes far beyond the truth's, and which."""
+    """Return the ends of a plot of a contact's force where runs go far beyond the truth's, and which."""
     ends = {label(trace): (np.nanmin(lam), np.nanmax(lam)) for trace in traces
             if np.isfinite(lam := trace.run.lam[:, k]).any()}  # fmt: skip
     low, high = ends.get(TRUTH, (0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Friction of one contact: its force against the cone, and which way it slips and is pushed in the contact's plane."""
+"""Friction of one contact: its force against the cone, and which way it slips and is pushed."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
 
 
 def _pressed(traces: Sequence[Trace]) -> tuple[Contact, int] | None:
-    """The contact with friction, and which of its places, that carries most in the first motion that presses any."""
+    """The contact with friction, and its place, that carries most in the first motion with any."""
     told = traces[0].about.get("scene") if traces else None
     rubs = [one for one in contacts(scene_from(told)) if one.friction > 0.0] if told else []
     places = [(one, k) for one in rubs for k in range(one.places)]

@@ -1,4 +1,4 @@
-"""From sections to HTML: the templates with their filters, names that are safe in a path, numbers for a reader."""
+"""From sections to HTML: templates with their filters, names safe in a path, numbers for a reader."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def _busiest(traces: Sequence[Trace]) -> int | None:
 
 
 def _line(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
-    """Force over depth of one engine while its contact carries, with a break where it does not; empty without any."""
+    """Force over depth of one engine while its contact carries, broken where it does not; or empty."""
     depth, lam = -trace.run.gap[:, k], trace.run.lam[:, k]
     carries = np.isfinite(lam) & (lam != 0.0) & np.isfinite(depth)
     if not carries.any():

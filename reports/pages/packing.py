@@ -25,7 +25,7 @@ def packed_text(text: str) -> str:
 
 
 def packed_value(value: Any) -> str:
-    """A value of JSON, in which arrays are as plotly reads them (`dtype`, `bdata`, `shape`), as base64 of gzip."""
+    """A JSON value whose arrays are as plotly reads them (`dtype`, `bdata`, `shape`), as base64 of gzip."""
     arrays: list[bytes] = []
     text = json.dumps(_taken(value, arrays), separators=(",", ":")).encode()
     return _folded(struct.pack("<I", len(text)) + text + b"".join(arrays))

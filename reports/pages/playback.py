@@ -150,7 +150,7 @@ def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
 
 
 def typical(largest: Iterable[float]) -> float:
-    """What is drawn as the longest arrow: the median of the largest of each engine that has one; 0 if none has."""
+    """What is drawn as the longest arrow: the median of the largest of each engine, or 0."""
     found = [x for x in largest if x > 0.0]
     return float(np.median(found)) if found else 0.0
 

@@ -1,4 +1,4 @@
-"""Run time against error on the page of a case: whole ladders where a benchmark stands in the folder, else the runs."""
+"""Run time against error on a case's page: whole ladders if the folder has a benchmark, else the runs."""
 
 from __future__ import annotations
 

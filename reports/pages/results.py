@@ -1,4 +1,4 @@
-"""What a folder of results holds, as far as pages need it: tables at once, motions when a page asks for them."""
+"""What a folder of results holds, as far as pages need it: tables at once, motions when asked for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stacked plots over one time axis, as plain dictionaries: plotly's own objects would take most of a page's time."""
+"""Stacked plots over one time axis, as plain dictionaries: plotly's objects would take most of the time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from crossbody.reports.runs.thin import AROUND, keep
 
 FINE = 2e-5  # distance of samples over the horizon below which times are written in double precision
 EVENTS, SHARE = 40, 0.4
-"""Events around which all samples stay, the first of them where there are very many, and their share of a line."""
+"""Events around which all samples stay, the first if very many, and their share of a line."""
 TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46
 """Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one
 group, between groups (with times), pixels."""

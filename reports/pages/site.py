@@ -134,7 +134,7 @@ def _origin(found: Results, shown: Sequence[Section]) -> list[Section]:
 
 
 def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
-    """Every page, made one after another; a folder of one study and no case, or of a log, is led by its study."""
+    """Every page, made one after another; a folder without cases is led by its study."""
     studied = list(_studies(found))
     alone = studied if _leads(found) else []
     for page in index_pages(found):

@@ -1,4 +1,4 @@
-"""Figures of a replay and of an identification, as plain values: what was measured and predicted, and what is left."""
+"""Figures of a replay and of an identification, as plain values: measured, predicted, and what is left."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()
 
 
 def residual(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:
-    """Measured less predicted over the recorded time beside the band of noise, a plot a channel, a line an engine."""
+    """Measured less predicted over time beside the noise's band, a plot a channel, a line an engine."""
     channels = _channels(rows)
     data, shapes = [], list(_shades(rows, held, len(channels)))
     for place, (channel, _) in enumerate(channels, start=1):
@@ -72,7 +72,7 @@ def correlation(rows: pd.DataFrame) -> Figure:
 
 
 def profile(rows: pd.DataFrame, estimates: pd.DataFrame) -> Figure:
-    """How the cost rises about every estimate, its 95 % interval in grey; a parabola where the model is linear."""
+    """How the cost rises about every estimate, 95 % intervals in grey; a parabola if linear."""
     names = list(dict.fromkeys(rows["name"]))
     known = estimates.set_index("name")
     data, shapes = [], []

@@ -1,4 +1,4 @@
-"""Predictions of a replay on disk as soon as they are there: the command that was interrupted goes on with them."""
+"""Predictions of a replay on disk as soon as they are there: an interrupted command goes on with them."""
 
 from __future__ import annotations
 

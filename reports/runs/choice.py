@@ -1,4 +1,4 @@
-"""What is asked to be run: cases, engines and their settings. Nothing is imported that wrong words would wait for."""
+"""What is asked for: cases, engines, settings. Imports nothing that wrong words would wait for."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def move(source: Path, target: Path, name: str) -> None:
 
 
 def remove(folder: Path, names: Iterable[str]) -> None:
-    """Remove files, and the folders inside `folder` that are empty then; what is not there, or no file, is left."""
+    """Remove files, and the folders inside `folder` that are empty then; what is no file is left."""
     parents = set()
     for name in names:
         place = PurePosixPath(name)

@@ -32,7 +32,7 @@ from crossbody.reports.runs.choice import Pick, check_known, of_case, of_pick
 
 FINEST_TOLERANCE = 1e-12
 LOOSER = 10.0
-"""A tolerance of a study over the tightest: how far their runs are apart tells what the tightest is known to."""
+"""A tolerance of a study over the tightest: what their runs differ by tells the tightest's error."""
 MANY_STEPS, HALVINGS, LEAST_SIZES = 10_000, 5, 3
 """A step is halved twice for its study, and up to five times while that takes no more steps; a run
 that has more by itself is studied at twice and four times its step. An order needs three of them."""
@@ -48,7 +48,7 @@ FIRST, DEAR = 0.02, 12.0
 is not begun unless its profile is asked for: engines that follow the law take their steps in Python."""
 COMPILED = ("reference", "compiled")  # who follows what the truth has followed
 READER = "reader"
-"""Setting of an engine that reads files by itself: "file", or "scene" for the model that is built from the scene."""
+"""Setting of an engine that reads files by itself: "file", or "scene" for the model of the scene."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,7 +150,7 @@ def of_start(case: Case, why: str) -> Trajectory:
 def _entry(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
 ) -> Entry:  # fmt: skip
-    """The run of one engine; whatever it throws is a row of its own, so that the others are judged all the same."""
+    """The run of one engine; whatever it throws is a row, and the others are judged."""
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
@@ -285,7 +285,7 @@ def _cost(setting: str, sizes: Sequence[float], size: float, once: float) -> flo
 
 
 def _sizes(setting: str, size: float, steps: int, tight: float) -> list[tuple[float, ...]]:
-    """Steps or tolerances of a study, falling; where a second one stands it is for when a run of the first fails."""
+    """Steps or tolerances of a study, falling; a second one is for when a run of the first fails."""
     if setting == "rtol":
         tightest = min(max(FINEST_TOLERANCE, tight), size)
         return [(LOOSER * tightest, tightest)]

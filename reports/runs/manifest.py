@@ -167,7 +167,7 @@ def write(folder: Path, manifest: Manifest) -> None:
 
 
 def replace_text(path: Path, text: str) -> None:
-    """Write one file of a folder that is ours already, whole or not at all; a link there is replaced, not followed."""
+    """Write one file of a folder of ours, whole or not at all; a link there is replaced, not followed."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as file:

@@ -32,7 +32,7 @@ OURS = (MARKER, HALF)  # how all that begins that crossbody makes in an output f
 
 @dataclass(slots=True)
 class _Staged:
-    """A study that is being written: into which folder, and which files of others stand beside it for the pages."""
+    """A study that is being written: into which folder, and others' files beside it for the pages."""
 
     home: Path
     study: str
@@ -151,7 +151,7 @@ def first_missing(home: Path) -> Path | None:
 
 
 def take_away(home: Path, first: Path | None) -> None:
-    """Remove the folders, from `first` on inwards, that were made for a study that failed, as far as they are empty."""
+    """Remove the folders, from `first` on inwards, made for a study that failed, if empty."""
     while first is not None and first in (home, *home.parents):
         try:
             home.rmdir()
@@ -161,7 +161,7 @@ def take_away(home: Path, first: Path | None) -> None:
 
 
 def _own(made: Path) -> set[str]:
-    """Files of the study itself; the empty tables that every folder has are dropped where another study has them."""
+    """Files of the study itself; empty tables are dropped where another study has them."""
     staged, known = _STAGED[made], manifest.read(_STAGED[made].home)
     own = {name for name in files.walked(made) if not staged.is_linked(made, name)}
     if staged.study in JUDGED:
@@ -191,7 +191,7 @@ def gather(made: Path) -> Path:
 
 
 def _link(home: Path, name: str, to: Path) -> None:
-    """The same file under a second name; a copy where the disk has no links. Whoever writes it replaces it."""
+    """The same file under a second name; a copy on disks without links. Whoever writes it replaces it."""
     with files.open_inside(home, name) as file:
         try:
             os.link(home / name, to, follow_symlinks=False)
@@ -248,7 +248,7 @@ def _place(home: Path, ready: Path) -> None:
 
 @contextmanager
 def _locked(path: Path, wait: bool = True) -> Iterator[bool]:
-    """Hold a folder against other processes; whether it could be had. The system lets go when this process ends."""
+    """Hold a folder against other processes; whether it could be had. The end of this process lets go."""
     handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))

@@ -111,7 +111,7 @@ class Parts:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Take the parts away when what they were for is written, where there are none, and after wrong use."""
+        """Take the parts away when what they are for is written, if there are none, and after wrong use."""
         if kind is None or not self.found or issubclass(kind, (InvalidValue, UnknownName)):
             shutil.rmtree(self.path, ignore_errors=True)
             output.take_away(self.out, self.first)

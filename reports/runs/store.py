@@ -76,7 +76,7 @@ def save(path: Path, trace: Trace) -> None:
 
 
 def _column(values: Floats) -> pa.Array:
-    """Return the bytes of an array as a column: `pa.array` imports pandas (.3 s) to see whether it is one of its."""
+    """Return the bytes of an array as a column: `pa.array` imports pandas (.3 s) to look at it."""
     held = pa.py_buffer(np.ascontiguousarray(values))
     return pa.Array.from_buffers(pa.from_numpy_dtype(values.dtype), len(values), [None, held])
 

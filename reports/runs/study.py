@@ -125,7 +125,7 @@ def write_rows(stem: Path, rows: Sequence[Row], kinds: Mapping[str, type], prove
 
 
 def _quoting(cells: Iterable[object]) -> Literal[0, 1]:
-    """What is quoted: a carriage return is plain text to the writer, and the end of a line to what reads it."""
+    """What is quoted: a carriage return is text to the writer, the end of a line to readers."""
     returns = any("\r" in cell for cell in cells if isinstance(cell, str))
     return csv.QUOTE_ALL if returns else csv.QUOTE_MINIMAL
 
@@ -181,7 +181,7 @@ def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
 
 
 def _beside(truth: Truth, run: Trajectory) -> Trajectory | None:
-    """The truth at every sample of a run, impacts matched as the metrics match them; NaN where nothing is compared."""
+    """The truth at every sample of a run, impacts matched as in metrics; NaN where nothing is compared."""
     if not len(run.t):
         return None
     inside, exact = aligned(truth, run)

@@ -38,7 +38,7 @@ _PARENT_DEATH = 1  # PR_SET_PDEATHSIG
 
 
 class Stopped(BaseException):
-    """The user interrupts the command. Not a KeyboardInterrupt, which a run takes as the end of itself alone."""
+    """The user interrupts the command. Not a KeyboardInterrupt, which a run takes as its own end."""
 
 
 class _Diary:
@@ -66,13 +66,13 @@ _lost: dict[str, str] = {}
 
 
 def limited(label: str, seconds: float = LIMIT) -> None:
-    """Say what is run from now on and how long it may take, s; nothing but that is lost if it hangs or crashes."""
+    """Say what is run from now on and how long it may take, s; it alone is lost if it hangs or crashes."""
     if _diary is not None:
         _diary.write(label=label, until=time.monotonic() + seconds, seconds=seconds)
 
 
 def stopping() -> bool:
-    """Whether the user has interrupted this process, also where a library has taken that for a fault of its own."""
+    """Whether the user has interrupted this process, also where a library took that for its fault."""
     return _stopping
 
 
@@ -291,7 +291,7 @@ def _obey(command: Callable[[], int]) -> None:
 
 
 class _Pipe(io.FileIO):
-    """An output whose reader may leave: what is said then goes nowhere, and the command does its work all the same."""
+    """An output whose reader may leave: then words go nowhere, and the command goes on."""
 
     def write(self, data: Buffer, /) -> int:
         try:
@@ -314,7 +314,7 @@ def _unread(stream: TextIO) -> TextIO:
 
 
 def _leave(code: int) -> None:
-    """End as an interpreter does that comes to its end: threads joined, exit functions called, streams flushed."""
+    """End as an interpreter does: threads joined, exit functions called, streams flushed."""
     import atexit
     import threading
 
@@ -339,7 +339,7 @@ def _stop_again(_number: int, _frame: FrameType | None) -> None:
 
 
 def _insist(swallowed: sys.UnraisableHookArgs) -> None:
-    """Raise an interrupt again soon that reached Python where nothing can be raised: in a callback or a finaliser."""
+    """Raise an interrupt again soon that came where nothing can be raised: in a callback or a finaliser."""
     if isinstance(swallowed.exc_value, Stopped):
         signal.setitimer(signal.ITIMER_REAL, SOON)
     else:

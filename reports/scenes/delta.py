@@ -26,7 +26,7 @@ def stage(p: Parameters) -> Stage:
 
 
 def poses(q: Floats, p: Parameters) -> Floats:
-    """Points of the arms, by n = (0, -s1, c1), d = (s2 s3, c2, s2 c3); the flange stands between the wrists."""
+    """Points of the arms, by n = (0, -s1, c1), d = (s2 s3, c2, s2 c3); the flange between the wrists."""
     arms = [_arm(q[:, 3 * i : 3 * i + 3], turn, p) for i, turn in enumerate(turns(p))]
     wrists = [arm[:, 2] for arm in arms]
     return np.concatenate([*arms, np.mean(wrists, axis=0)[:, None, :]], axis=1)

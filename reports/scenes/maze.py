@@ -28,7 +28,7 @@ def poses(q: Floats, p: Parameters) -> Floats:
 
 
 def arrows(q: Floats, lam: Floats, p: Parameters) -> Floats:
-    """Forces on the ball: of the faces along the radius, of the tips away from the nearest cap, of rolling across."""
+    """Forces on the ball: faces along the radius, tips away from the nearest cap, rolling across."""
     maze = maze_of(p)
     ball = q[:, 1:3]
     out = ball / np.maximum(np.linalg.norm(ball, axis=1, keepdims=True), 1e-12)
@@ -59,7 +59,7 @@ def _arc(radius: float, at: Floats) -> Floats:
 
 
 def _cap(ring: Ring, angle: float, half: float) -> Floats:
-    """Half a circle around a cap's centre, from the outer face to the inner one, or back where `half` is pi."""
+    """Half a circle around a cap's centre, from the outer face to the inner one, or back for `half` = pi."""
     turn = angle + half + np.linspace(0.0, np.pi, 7)[1:-1]
     return _arc(ring.middle, np.array([angle])) + _arc(ring.cap, turn)
 

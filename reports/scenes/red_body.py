@@ -27,7 +27,7 @@ def poses(q: Floats, p: Parameters) -> Floats:
 
 
 def arrows(q: Floats, lam: Floats, p: Parameters) -> Floats:
-    """Feet upwards; lower corners along the slab's normal; the wall pushes the upper right corner to the left."""
+    """Feet upwards; lower corners along the slab's normal; the wall leftwards at the upper right."""
     a, b, d, foot = (float(p[k]) for k in ("half_width", "half_height", "slab_half_height", "foot"))
     box_, slab = q[:, :3], q[:, 3:]
     normal = np.stack([-np.sin(slab[:, 2]), np.cos(slab[:, 2])], axis=1)

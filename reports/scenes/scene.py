@@ -1,4 +1,4 @@
-"""A scene from data in space: its shapes, bodies without shapes as the boxes of their inertia, and their frames."""
+"""A scene from data in space: its shapes, other bodies as the boxes of their inertia, and frames."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def poses(q: Floats, p: Parameters) -> Floats:
 
 
 def arrows(q: Floats, lam: Floats, p: Parameters) -> Floats:
-    """Return the forces of the contacts on their second shapes, and of loops on their first points (n, arrows, 6)."""
+    """Return forces of contacts on their second shapes, of loops on their first points (n, arrows, 6)."""
     scene = _scene(p)
     found = list(_arrows(scene, q, np.nan_to_num(lam)))
     return np.stack(found, axis=1) if found else np.zeros((len(q), 0, 6))
@@ -85,7 +85,7 @@ def _arrows(scene: Scene, q: Floats, lam: Floats) -> Iterator[Floats]:
 
 
 def _resultant(normal: Floats, points: Floats, pushing: Floats) -> Floats:
-    """Return the sum of parallel forces (n, 6), at the point where it acts: a hull has hundreds of corners."""
+    """Return the sum of parallel forces (n, 6), where it acts: a hull has hundreds of corners."""
     total = pushing.sum(axis=1, keepdims=True)
     share = np.divide(pushing, total, out=np.zeros_like(pushing), where=total != 0.0)
     return np.concatenate([np.einsum("nk,nki->ni", share, points), normal * total], axis=1)

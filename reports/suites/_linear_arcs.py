@@ -29,7 +29,7 @@ HALVINGS = 60
 
 @dataclass(slots=True)
 class _Conditions:
-    """Linear conditions, functionals of x: row `rows[k]` switches where all of its `parts[k]` are negative."""
+    """Linear conditions, functionals of x: row `rows[k]` switches where all its `parts[k]` are negative."""
 
     functionals: Floats
     rows: list[int] = field(default_factory=list)
@@ -182,7 +182,7 @@ class LinearArcs:
         return left, None
 
     def _fall(self, F: Floats, states: Floats, functionals: Floats, worst: Floats, step: float) -> float:
-        """Where the largest of these functionals first falls below zero in a block; infinite if it does not."""
+        """Where the largest of these functionals first falls below zero in a block; or infinity."""
         below = np.flatnonzero(worst[1:] < 0.0)
         last = int(below[0]) + 1 if len(below) else BLOCK
         inner = worst[1:last]

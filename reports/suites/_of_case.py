@@ -62,7 +62,7 @@ def _axis(parameter: Parameter) -> Axis | None:
 
 
 def _pushes(case: Case) -> list[str]:
-    """Return a push of the whole weight for a twentieth of a second on each body, in a direction of its own."""
+    """Return a push of the weight for a twentieth of a second on each body, in a direction of its own."""
     assert case.scene is not None
     rng, found = np.random.default_rng(0), []
     weight = 9.81 * sum(body.mass for body in case.scene.bodies)

@@ -29,7 +29,7 @@ def damped(drawn: Drawn, _rng: np.random.Generator) -> Drawn:
 
 
 def uneven(drawn: Drawn, rng: np.random.Generator) -> Drawn:
-    """Masses even in their logarithm between 1/sqrt(ratio) and sqrt(ratio), the two ends among them; who strikes."""
+    """Masses even in logarithm between 1/sqrt(ratio) and sqrt(ratio), both ends among them; who strikes."""
     import numpy as np
 
     found: dict[str, Any] = dict(drawn)
@@ -82,7 +82,7 @@ def anywhere(drawn: Drawn, rng: np.random.Generator) -> Drawn:
 
 
 def at_the_edge(drawn: Drawn, _rng: np.random.Generator) -> Drawn:
-    """From (0, 0, 0.5) in a direction to the edge of the delta robot's workspace, less a part `off` of the way."""
+    """From (0, 0, 0.5) towards the edge of the delta robot's workspace, less a part `off` of the way."""
     import numpy as np
 
     azimuth, elevation, off = numbers(drawn, "azimuth", "elevation", "off")

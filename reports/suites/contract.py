@@ -42,7 +42,7 @@ class Ladder:
 
 
 TIGHT = Ladder(rtol=(1e-12,), dt=(1e-4,))
-"""For scenes that multiply errors: asked for 1e-12, an error of 1e-6 is within reach where 1e-9 would not do."""
+"""For scenes that multiply errors: asked for 1e-12, an error of 1e-6 is within reach, and 1e-9 not."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

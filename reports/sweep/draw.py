@@ -23,7 +23,7 @@ from crossbody.reports.sweep.spec import Spec
 
 SHARE = 400
 LEAST = 3
-"""One run of another engine beside so many of the first, and at least so many, where the user names no engine."""
+"""One run of another engine beside so many of the first, and at least so many, where none is named."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

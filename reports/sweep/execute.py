@@ -23,7 +23,7 @@ from crossbody.reports.sweep.spec import Spec
 
 RTOL = 1e-9  # of the reference, if nothing is said
 ACCOUNT = 10.0
-"""The energy account may leave so many times the limit of the error open: it adds up the errors of all steps."""
+"""The energy account may leave so many times the limit of the error open: it adds up all steps' errors."""
 AFFORD = 1_000
 """The independent integrator is asked for every run of at most so many steps, and gets as much time as a
 run may take: it takes some ten times the steps. Where that is not enough the energy account alone judges."""
@@ -137,7 +137,7 @@ def _error(spec: Spec, tried: Tried) -> Error:
 
 
 def limit(spec: Spec, settings: Mapping[str, float] | None) -> float:
-    """Largest error of the reference, in proportion to the tolerance where that is coarser than its default."""
+    """Largest error of the reference, in proportion to a tolerance coarser than its default."""
     return spec.limit * max(1.0, _rtol(settings) / RTOL)
 
 
@@ -146,7 +146,7 @@ def _rtol(settings: Mapping[str, float] | None) -> float:
 
 
 def _beside(spec: Spec, case: Case, settings: Mapping[str, float] | None) -> Case:
-    """The scene with every number moved by the tolerance of the run, up or down; by the truth's if that is coarser."""
+    """The scene with every number moved up or down by the run's tolerance, or the truth's if coarser."""
     apart = max(_rtol(settings), 0.0 if case.closed_form is not None else SECOND_RTOL)
     signs = np.random.default_rng(spec.seed)
     near: dict[str, cases.Value] = {
@@ -194,7 +194,7 @@ def row(spec: Spec, tried: Tried, error: Error, heard: list[str]) -> dict[str, A
 
 
 def _verdict(spec: Spec, tried: Tried, error: Error, most: float, open_: float, faults: list[str]) -> tuple[Word, str]:
-    """Dishonest ends are outside for everybody, inaccuracy for the reference; an engine's is shown, not judged."""
+    """Dishonest ends are outside for everybody, inaccuracy for the reference; an engine's is but shown."""
     if faults:
         return Word.OUTSIDE, "; ".join(faults)
     if tried.outcome in (SKIPPED, REFUSED):

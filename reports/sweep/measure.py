@@ -19,9 +19,9 @@ from crossbody.reports.measuring.truth import Truth, from_run
 SHARES = (33, 49)
 """How many instants of a run are looked at, evenly and from 1e-12 of the horizon on by their logarithm."""
 STEPS = 100
-"""Fewest steps that a run counts for where its errors are added up: independent ones grow with the root of that."""
+"""Fewest steps that a run counts for where its errors are added up: independent ones grow by its root."""
 TRACE = 1e-3
-"""A touch or release whose shift leaves less than this part of it in the motion is one that pressed nothing."""
+"""A touch or release whose shift leaves less than this part of it in the motion pressed nothing."""
 SECOND_RTOL = 1e-12  # tolerance of the independent integrator: grazing multiplies its errors by 1e5
 
 
@@ -59,7 +59,7 @@ class Error:
 
 
 def instants(t_end: float) -> Floats:
-    """When a run is looked at, s: what decays at once is seen as well, and gives the scale of what is at rest later."""
+    """When a run is looked at, s: what decays at once counts too, for the scale of what rests later."""
     even, early = SHARES
     return np.unique(np.concatenate([np.linspace(0.0, t_end, even), t_end * np.logspace(-12.0, 0.0, early)]))
 
@@ -90,7 +90,7 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
 
 
 def _truth(case: Case, times: Floats, asked: Asked) -> Truth | str:
-    """The closed form, else the independent integrator; a sentence (empty: not asked) where neither is at hand."""
+    """The closed form, else the independent integrator; a sentence (empty: not asked) without."""
     found = "" if case.closed_form is None else _exact(case, times)
     if isinstance(found, str) and asked.second is not None:
         return _second(case, times, *asked.second)
@@ -206,7 +206,7 @@ def _matched(truth: Truth, run: Trajectory, case: Case) -> Error:
 
 
 def _with_trace(shift: float, apart: float) -> float:
-    """A shift of touches or releases, relative; 0 where the motion shows none of it: a gap that stood still let go."""
+    """A shift of touches or releases, relative; 0 if no motion shows it: a still gap let go."""
     return 0.0 if apart < TRACE * shift else shift
 
 

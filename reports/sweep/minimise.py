@@ -1,4 +1,4 @@
-"""A failure made small: its parameters moved to the case's own as long as the run still fails in the same way."""
+"""A failure made small: its parameters moved to the case's own while the run fails the same way."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def defaults(spec: Spec) -> dict[str, Value]:
 
 
 def _same(spec: Spec, first: pd.Series[Any]) -> Fails:
-    """Whether a run fails in the same way; the independent integrator is asked only about one that says finished."""
+    """Whether a run fails in the same way; the independent integrator is asked of finished ones."""
     second = spec.second and first["outcome"] == Outcome.FINISHED.value
 
     def fails(parameters: Mapping[str, Value]) -> bool:

@@ -51,7 +51,7 @@ def processes(chunks: Sequence[Chunk], jobs: int) -> Iterator[tuple[int, Rows]]:
 
 
 def surviving(function: Callable[[Task], Done], tasks: Sequence[Task], jobs: int) -> Iterator[Done]:
-    """What comes back from processes, as it is done, until one ends that should not have; with one job, from here."""
+    """What comes back from processes, as done, until one ends that should not; with one job, from here."""
     if jobs == 1:
         yield from map(function, tasks)
         return
@@ -74,7 +74,7 @@ def _single(spec: Spec) -> Rows:
 
 
 def warm(chunks: Sequence[Chunk]) -> None:
-    """Have the reference's kernels compiled to disk once, before several processes want them at the same time."""
+    """Have the reference's kernels compiled to disk once, before several processes want them."""
     seen = set[tuple[str, str]]()
     for _, specs in chunks:
         for spec in specs:

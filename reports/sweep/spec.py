@@ -57,7 +57,7 @@ class Spec:
         return {"rtol": self.ladder.rtol[self.rung], "dt": self.ladder.dt[self.rung]}
 
     def command(self, settings: Mapping[str, float], parameters: Mapping[str, Value] | None = None) -> str:
-        """The command line that repeats this run alone, with the settings as they were used, and other parameters."""
+        """The command line that repeats this run alone, with settings as used, and other parameters."""
         words = ["crossbody", "run", self.case, "--variant", self.variant, "--engine", f"{self.engine}:{self.profile}"]
         for name, value in (self.parameters if parameters is None else parameters).items():
             words += ["--set", f"{name}={_text(value)}"]

@@ -1,4 +1,4 @@
-"""Rows on disk as they arrive: one part file a chunk, whole or not there; a killed sweep goes on where it stood."""
+"""Rows on disk as they arrive: one part file a chunk, whole or not there; a killed sweep goes on."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from crossbody.reports.sweep.execute import COLUMNS, TIMES
 from crossbody.reports.sweep.spec import Spec
 
 STRESS = "stress"
-"""The study's name; its parts and what says which sweep they are of are no tables, and stay when these are replaced."""
+"""The study's name; its parts, and which sweep's they are, are no tables and stay."""
 SWEEP, PARTS = "sweep.json", "parts"
 
 
@@ -66,7 +66,7 @@ class Store:
         output.replace_text(self.path / SWEEP, json.dumps(self.about, indent=1))
 
     def _names(self) -> list[str]:
-        """Names of the parts; their folder is made where it is not there, and no link to another is followed."""
+        """Names of the parts; their folder is made if need be, and no link followed."""
         with files.directory(self.path, PARTS, make=True):
             return files.listed(self.path, PARTS)
 
@@ -104,7 +104,7 @@ class Store:
             raise OutputError(f"Part {path} cannot be written: {error.strerror or error}.") from error
 
     def table(self) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """All rows in the order of the sweep, and apart from them how long each took: that is never the same twice."""
+        """All rows in the order of the sweep, and apart how long each took: never the same twice."""
         names = [name for name in self._names() if name.endswith(".parquet") and not name.startswith(".")]
         parts = [self._read(name) for name in names]
         joined = pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=[*COLUMNS, TIMES[1]])

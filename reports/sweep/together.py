@@ -1,4 +1,4 @@
-"""Runs of the reference of which only the end is asked for: many of one mechanism at once, without the interpreter."""
+"""Runs of the reference of which only the end is asked for: many of a mechanism at once, compiled."""
 
 from __future__ import annotations
 

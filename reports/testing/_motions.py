@@ -1,4 +1,4 @@
-"""Assertions about motions, each told by the first instant that offends: two are the same, one keeps its account."""
+"""Assertions about motions, told by the first offence: two are the same, one keeps its account."""
 
 from __future__ import annotations
 

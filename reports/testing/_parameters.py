@@ -1,4 +1,4 @@
-"""Which cases and engines a session asks for: by a test's mark, the command line, or the configuration file."""
+"""Which cases and engines a session asks for: by mark, command line or configuration file."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Add the mark of generated tests, by which a test of one's own names its cases and engines; import plug-ins."""
+    """Add the mark by which one's own tests name cases and engines; import plug-ins."""
     config.addinivalue_line(
         "markers", f"{MARKER}(*cases, engines=()): cases and engines of a test that uses crossbody's fixtures"
     )
@@ -86,7 +86,7 @@ def pytest_make_collect_report(
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """One test for every case and engine asked for, by the test's mark, the command line or the configuration."""
+    """One test for every case and engine asked for, by its mark, the command line or configuration."""
     if not {_SCENE, _PICK} & set(metafunc.fixturenames):
         return
     from crossbody.reports.testing._parameters import picks, scenes
@@ -126,7 +126,7 @@ def crossbody_case(request: pytest.FixtureRequest, _crossbody_scene: Scene) -> C
 
 @pytest.fixture(scope="session")
 def crossbody_engine(_crossbody_pick: Pick) -> Chosen:
-    """Each engine and profile asked for: `prepare(case, **settings)`, `engine`, `profile`; skipped if not installed."""
+    """Each engine and profile asked for: `prepare(case, **settings)`, `engine`, `profile`; or skipped."""
     from crossbody.reports.testing._bench import Chosen
 
     return Chosen.of(_crossbody_pick)
@@ -140,7 +140,7 @@ def crossbody_truth(request: pytest.FixtureRequest, _crossbody_scene: Scene) -> 
 
 @pytest.fixture(scope="session")
 def crossbody_run(request: pytest.FixtureRequest, _crossbody_scene: Scene, _crossbody_pick: Pick) -> Trajectory:
-    """The motion of each case on each engine at its own settings; skipped where the engine cannot run the case."""
+    """The motion of each case on each engine at its own settings; skipped if it cannot."""
     entry = bench(request.config).entry(_crossbody_scene, _crossbody_pick)
     if entry.run is None:
         pytest.skip(entry.skipped)

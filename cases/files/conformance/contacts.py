@@ -1,4 +1,4 @@
-"""Features of MJCF: which shapes may touch, how rough they are, and how soft contacts, bounds and loops are."""
+"""Features of MJCF: which shapes may touch, how rough they are, how soft contacts, bounds and loops."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def meeting(*names: str, friction: tuple[float, ...] = (1.0, 1.0, 0.0, 0.0, 0.0)
 
 
 def touching(floor: str = "", a: str = "", b: str = "", head: str = "", tail: str = "", wrist: bool = False) -> str:
-    """Return the arm with a ball on each link above a plane, of which more is said, and a third link if wanted."""
+    """Return the arm with a ball on each link above a plane, and a third link if wanted."""
     hand = (
         '<body name="hand" pos="0 0 -.3"><joint name="wrist" axis="0 1 0"/>'
         f'{LOWER_INERTIAL}<geom name="c" size=".04"/></body>'

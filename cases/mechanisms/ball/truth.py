@@ -122,7 +122,7 @@ _NEXT: dict[Mode, Callable[[Ball, Arc], Arc | None]] = {
 
 
 def arcs(ball: Ball, h: float, v: float, t_end: float) -> Iterator[Arc]:
-    """The pieces of the motion from (h, v) at t = 0, in order; a start that is not free is its own first event."""
+    """The pieces of the motion from (h, v) at t = 0, in order; a start in contact is its first event."""
     if ball.bilateral:
         yield Arc(0.0, Mode.BILATERAL, h, v)
         return

@@ -22,7 +22,7 @@ from crossbody.cases.mechanisms.cradle.scene import Row
 
 RTOL, ATOL = 1e-12, 1e-14
 SHUT = 1e-11
-"""A gap below this part of speed/w counts as closed for the memoryless law: rounding must not open what rests."""
+"""A gap below this part of speed/w is closed for the memoryless law: rounding must not open what rests."""
 MAX_STEPS = 200_000
 
 Force = Callable[[Floats, Floats], Floats]
@@ -41,7 +41,7 @@ def hertz(row: Row) -> Floats:
 
 
 def memoryless(row: Row) -> Floats:
-    """Speeds under the memoryless law at the row's own gap, a0 and zeta (n,), m/s; NaN if they do not part."""
+    """Speeds under the memoryless law at the row's own gap, a0 and zeta (n,), m/s; NaN if they stay."""
     G = delassus(row.masses)
 
     def force(h: Floats, rate: Floats) -> Floats:

@@ -61,7 +61,7 @@ def _push(masses: Floats, v: Floats, impulses: Impulses) -> Impulses:
 
 
 def simultaneous(masses: Floats, v: Floats, touching: Touching, e: float, slow: float) -> Iterator[Impulses]:
-    """All impulses of what touches and does not part, and again if some approach then; arguments as of `sequential`."""
+    """All impulses of what touches and stays, again if some then approach; arguments as of `sequential`."""
     while (touching & (np.diff(v) < -slow)).any():
         rows = np.flatnonzero(touching & (np.diff(v) <= slow))
         impulses = pushes(delassus(masses)[np.ix_(rows, rows)], (1.0 + e) * np.diff(v)[rows])

@@ -82,7 +82,7 @@ _STEP: Mapping[tuple[str, str], tuple[float, str]] = {
     ("mujoco", "matched"): (1e-4, "Runge-Kutta 4 with located events, twenty steps a contact, then straight lines"),
     ("pinocchio", "law"): (2e-5, "relative tolerance of 1e-10, in many short arcs where balls touch"),
 }
-"""Sliders: largest error of position against the equations that an engine really follows (twice what was measured)."""
+"""Sliders: largest error of position against the engine's own equations (twice what was measured)."""
 
 
 def limits(mechanism: str, rule: str, gap: float, claims: Iterable[Claim]) -> tuple[Limit, ...]:

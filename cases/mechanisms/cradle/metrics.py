@@ -1,4 +1,4 @@
-"""What comes out of a cradle: speeds of the balls when no gap closes any more, beside what collision rules say."""
+"""What comes out of a cradle: the balls' last speeds, beside what collision rules say."""
 
 from __future__ import annotations
 

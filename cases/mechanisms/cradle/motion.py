@@ -23,7 +23,7 @@ TOUCH = 64.0 * float(np.finfo(np.float64).eps)
 
 @dataclass(slots=True)
 class _Course:
-    """Pieces of straight motion (start, x, v, work of each row), impacts, and the fastest rate of a gap so far, m/s."""
+    """Straight motions (start, x, v, work of each row), impacts, the fastest rate of a gap so far, m/s."""
 
     starts: list[float] = field(default_factory=list)
     x: list[Floats] = field(default_factory=list)
@@ -99,11 +99,11 @@ class Motion:
         return len(course.events) > before
 
     def _closed(self, x: Floats) -> Touching:
-        """Gaps that count as closed: collisions that follow each other ever faster end there at one instant."""
+        """Gaps that count as closed: collisions that follow each other ever faster end at one instant."""
         return np.asarray(self.row.gap + np.diff(x) <= TOUCH * max(1.0, float(np.abs(x).max())))
 
     def _come_together(self, x: Floats, v: Floats, touching: Touching, slow: float) -> None:
-        """Give balls that touch and stand still against each other one speed, to which collisions without end lead."""
+        """Give balls that touch and move together one speed, to which collisions without end lead."""
         still = (touching | self._closed(x)) & (np.abs(np.diff(v)) <= slow)
         touching |= still
         m, first = self.row.masses, np.concatenate([[0], np.flatnonzero(~still) + 1, [self.row.n]])
@@ -140,7 +140,7 @@ class Motion:
         return tuple(self._course.events)
 
     def __call__(self, t: Floats) -> Trajectory:
-        """The motion at nondecreasing times t (n,), s; an impact's instant asked for twice stands before and after."""
+        """The motion at nondecreasing times t (n,), s; an impact's twice: before and after."""
         t, course, m = np.asarray(t, dtype=np.float64), self._course, self.row.masses
         piece = pieces(np.array(course.starts), t)
         v, work = np.array(course.v)[piece], np.array(course.work)[piece]

@@ -31,7 +31,7 @@ def sequential(row: Row) -> Floats:
 
 
 def simultaneous(row: Row) -> Floats:
-    """Speeds if everything collides at once, as if all touched (n,), m/s; exact. Equal masses: (2 - n)/n, 2/n, ..."""
+    """Speeds if all collide at once, as if touching (n,), m/s; exact. Equal masses: (2 - n)/n, 2/n, ..."""
     return Motion(replace(row, gap=0.0), "simultaneous").final
 
 

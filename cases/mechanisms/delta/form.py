@@ -32,7 +32,7 @@ THIN = 2e-15  # inertia of a rod about itself, kg m^2: MuJoCo has no less
 ARMS = (1, 2, 3)
 ROBOT = ("d1", "d2", "d3", "l1", "l2", "offset", "upper", "lower", "kp", "kd", "stop", "ahead")
 D1, D2, D3, L1, L2, OFFSET, UPPER, LOWER, KP, KD, STOP, AHEAD = range(len(ROBOT))
-"""Of the numbers that the force reads; behind them stand the motors' angles at the start and at the end of a ramp."""
+"""Of the numbers that the force reads; behind them the motors' angles at both ends of a ramp."""
 
 
 def friction_and_servos(t: float, r: Floats, rd: Floats, p: Floats, out: Floats) -> None:
@@ -59,7 +59,7 @@ def friction_and_servos(t: float, r: Floats, rd: Floats, p: Floats, out: Floats)
 
 
 def numbers(p: Mapping[str, float], powered: bool) -> Floats:
-    """Return what `friction_and_servos` reads; of servos that move, of those that hold the start, or of none."""
+    """What `friction_and_servos` reads; of servos that move, of those that hold the start, or of none."""
     own = {
         **p, "offset": p["r_base"] - p["r_flange"], "kp": 0.0, "kd": 0.0, "stop": 0.0, "ahead": 0.0,
         "upper": (p["m1"] / 2 + p["m2"] + p["m3"] / 3) * p["gravity"] * p["l1"],

@@ -21,7 +21,7 @@ def flange(run: Trajectory, case: Case) -> Floats:
 
 
 def circle(p: pose.Numbers, t: Floats) -> Floats:
-    """Return the circle (n, 3), m, that the flange is to follow: about its start, with a radius that grows smoothly."""
+    """Return the circle (n, 3), m, that the flange is to follow: about its start, smoothly growing."""
     x = np.minimum(t / p["fade"], 1.0)
     radius = p["radius"] * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
     angle = 2.0 * math.pi * p["frequency"] * t

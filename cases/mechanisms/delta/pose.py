@@ -57,7 +57,7 @@ def _offset(p: Numbers) -> float:
 
 
 def _arm(p: Numbers, own: Floats) -> Floats:
-    """The elbow is where circles of radius l1 about the hinge and of what l2 spans in the plane about the tip meet."""
+    """The elbow: circles of l1 about the hinge and of what l2 spans in the plane about the tip meet."""
     y, z = own[1] - _offset(p), own[2]
     square = y * y + z * z
     along = 0.5 * (1.0 + (p["l1"] ** 2 - p["l2"] ** 2 + own[0] ** 2) / square)
@@ -77,7 +77,7 @@ def tips(p: Numbers, q: Floats) -> Floats:
 
 
 def flanges(p: Numbers, q: Floats) -> Floats:
-    """Flange (n, 3), m, of poses q (n, 9): the mean of the tips of its arms, which one loop gap parts at most."""
+    """Flange (n, 3), m, of poses q (n, 9): the mean of its arms' tips, a loop gap apart at most."""
     mean: Floats = tips(p, q).mean(axis=1)
     return mean
 
@@ -142,7 +142,7 @@ def mass(p: Numbers, q: Floats) -> Floats:
 
 
 def kicked(p: Numbers, q: Floats, impulse: Floats) -> Floats:
-    """Velocities (9,) behind a Dirac impulse (3,), N s, on the flange at rest: M dv = Jv^T J + H^T L, H dv = 0."""
+    """Velocities (9,) behind an impulse (3,), N s, on the flange at rest: M dv = Jv^T J + H^T L, H dv = 0."""
     H, push = closure(p, q), np.hstack(list(tip_jacobians(p, q))).T @ impulse / 3
     saddle = np.block([[mass(p, q), -H.T], [H, np.zeros((6, 6))]])
     return np.asarray(np.linalg.solve(saddle, np.concatenate([push, np.zeros(6)])), dtype=np.float64)[:9]

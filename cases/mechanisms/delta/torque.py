@@ -20,7 +20,7 @@ SIN = (0.0, -(0.75**0.5), 0.75**0.5)
 
 
 def numbers(p: Mapping[str, float]) -> Floats:
-    """Return what `motor_torque` reads: rods are thin and uniform, a third of the flange hangs at each tip."""
+    """Return what `motor_torque` reads: thin uniform rods, a third of the flange at each tip."""
     m1, m2, m3, l1, l2 = (p[name] for name in ("m1", "m2", "m3", "l1", "l2"))
     inertia = (m1 / 3 + m2 + m3 / 3) * l1**2 + p["jm"], (m2 / 2 + m3 / 3) * l1 * l2, (m2 + m3) / 3 * l2**2
     weight = (m1 / 2 + m2 + m3 / 3) * l1 * p["gravity"], (m2 / 2 + m3 / 3) * l2 * p["gravity"]

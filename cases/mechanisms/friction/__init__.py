@@ -1,1 +1,1 @@
-"""Coulomb friction: bodies on a floor whose motions have closed forms, and what MuJoCo's parameters make of them."""
+"""Coulomb friction: closed-form motions on a floor, and what MuJoCo's parameters make of them."""

@@ -25,7 +25,7 @@ def accelerations(p: Mapping[str, float]) -> tuple[float, float]:
 
 
 def point(p: Mapping[str, float]) -> Motion:
-    """Return the motion of a body that touches at one place and never turns: q = (x, y, z), rows (n, t1, t2)."""
+    """Return the motion of what touches at one place and never turns: q = (x, y, z), rows (n, t1, t2)."""
     down, _, press = field(p, p["slope"])
 
     def rows(path: Callable[[Floats], tuple[Floats, Floats, Floats]]) -> Callable[[Floats], Rows]:
@@ -47,7 +47,7 @@ def point(p: Mapping[str, float]) -> Motion:
 
 
 def box(p: Mapping[str, float], half: Vector) -> Motion:
-    """Return the motion of a free box that lies on its lower corners and does not tip: 8 normal rows, then 16."""
+    """Return the motion of a free box on its lower corners that does not tip: 8 normal rows, then 16."""
     down, _, press = field(p, p["slope"])
     low = np.flatnonzero(CORNERS[:, 2] < 0.0)
     arms = CORNERS[low, :2] * np.array(half[:2])

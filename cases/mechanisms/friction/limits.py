@@ -1,4 +1,4 @@
-"""What cases with friction share: their exact motion as the truth, limits, and how far engines creep by themselves."""
+"""What cases with friction share: exact motion as the truth, limits, how far engines creep."""
 
 from __future__ import annotations
 

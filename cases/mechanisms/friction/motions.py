@@ -71,7 +71,7 @@ class Motion:
 
     @property
     def presses(self) -> bool:
-        """Whether no place would have to pull: else what lies on several tips, and the motion is another one."""
+        """Whether no place would have to pull: else what lies on several tips."""
         return self.normals == 1 or bool((self(np.array([0.0, self.t_end])).lam[:, : self.normals] >= 0.0).all())
 
     def __call__(self, t: Floats) -> Trajectory:

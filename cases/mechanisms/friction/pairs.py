@@ -114,7 +114,7 @@ def stack(p: Mapping[str, float]) -> Motion:
 
 
 def held(p: Mapping[str, float]) -> Motion:
-    """Return the motion of a weight between two fingers: q = (x, z, left, right), rows (n1, n2, four tangential)."""
+    """Motion of a weight between two fingers: q = (x, z, left, right), rows (n1, n2, four tangential)."""
     g, press, most = p["gravity"], p["press"], p["mu"] * p["press"]
     slips = MASS * g > 2.0 * most
     force = most if slips else 0.5 * MASS * g

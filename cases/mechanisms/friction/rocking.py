@@ -24,7 +24,7 @@ EDGE = (1, 3)  # corners on which it stands
 
 
 class Block(NamedTuple):
-    """Half sides, m; half diagonal R, m; its angle to the height; tilt at the start, rad; p, 1/s, and the modulus k."""
+    """Half sides, half diagonal R, m; its angle to the height, tilt at the start, rad; p, 1/s; modulus k."""
 
     half: tuple[float, float, float]
     R: float

@@ -21,9 +21,9 @@ NUMBERS = {
 SLIDES = (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
 PLANAR = (("x", (1.0, 0.0, 0.0), "slide"), ("z", (0.0, 0.0, 1.0), "slide"), ("turn", (0.0, 1.0, 0.0), "hinge"))
 LOW, HIGH = (0.4, 0.3, 0.125), (0.1, 0.1, 0.125)
-"""Half sides of two blocks, m, whose heights add up without rounding: a gap of 1e-17 m would be one to fall through."""
+"""Half sides of two blocks, m, whose heights add up without rounding: 1e-17 m would be a gap."""
 GRIP, LIFTED, FINGER = 0.0625, 0.25, 0.125
-"""Of fingers: half of the width of what they hold, m, to which a radius adds up without rounding; height, m; kg."""
+"""Of fingers: half the width held, m, to which a radius adds without rounding; height, m; mass, kg."""
 FLOOR = Shape(name="floor", type="plane")
 
 
@@ -59,7 +59,7 @@ def block(name: str, half: Vector, mass: float = MASS, height: float = 0.0) -> B
 
 
 def point_on_floor(p: Mapping[str, float], radius: float) -> Scene:
-    """Return a body that never turns and touches at one place: a ball on three slides, its centre at the radius."""
+    """Return a body that never turns and touches at one place: a ball on three slides."""
     return Scene(
         bodies=(Body(name="block", mass=MASS, position=(0.0, 0.0, radius)),),
         joints=tuple(Joint(name=name, body="block", type="slide", axis=axis) for name, axis in SLIDES),
@@ -134,7 +134,7 @@ def tossed_cube(p: Mapping[str, float]) -> Scene:
 
 
 def gripper(p: Mapping[str, float]) -> Scene:
-    """Return a weight between two fingers that are pushed along x; its sides are planes with their y vertical."""
+    """Return a weight between two fingers that are pushed along x; its sides are planes."""
     r, sides = p["radius"], (("left", -1.0), ("right", 1.0))
     fingers = [Body(name=name, mass=FINGER, position=(way * (GRIP + r), 0.0, LIFTED)) for name, way in sides]
     planes = [

@@ -52,7 +52,7 @@ def attitude(s: Floats, spin: Floats, rate: Floats) -> Floats:
 
 
 def sphere(p: Mapping[str, float]) -> Motion | None:
-    """Return the motion: q = (x, y, z, quaternion), rows (n, t1, t2); None where it turns too often to be followed."""
+    """Return the motion: q = (x, y, z, quaternion), rows (n, t1, t2); None where it turns too often."""
     r, press = p["radius"], p["mu"] * p["gravity"]
     v0, spin = np.array([p["speed"], 0.0]), np.array([p["spin_x"], p["spin_y"], p["spin_z"]])
     u0 = v0 + r * np.array([-spin[1], spin[0]])

@@ -1,4 +1,4 @@
-"""Numbers that must come out of the ball maze, from its closed forms, and how far each engine may be off, and why."""
+"""Numbers that must come out of the ball maze, from closed forms, and how far engines may be off, and why."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _effective_mass(p: Mapping[str, Value], R: float) -> float:
 
 
 def _plain(p: Mapping[str, Value], side: str) -> bool:
-    """Whether the closed forms hold: nothing drives the maze, nothing brakes the ball, it starts on that side."""
+    """Whether the closed forms hold: no drive, no brake, a start on that side."""
     return p["controller"] == "off" and not p["rolling_damping"] and p["side"] == side and p["angle"] != 0.0
 
 
@@ -72,7 +72,7 @@ def _leave(p: Mapping[str, Value], maze: Maze) -> Iterator[Claim]:
 
 
 def _solved(p: Mapping[str, Value], maze: Maze) -> Iterator[Claim]:
-    """Every ring is passed once; the ball loses the height between its start on the top and the bottom of ring 0."""
+    """Every ring is passed once; the ball falls from its start on top to the bottom of ring 0."""
     top, bottom = maze.rings[int(p["ring"])].outer + maze.ball, maze.rings[0].inner - maze.ball
     lost = float(p["ball_mass"]) * tilted_gravity(p) * (top * math.cos(float(p["angle"])) + bottom)
     if p["controller"] == "off" or float(p["t_end"]) < ARRIVED:

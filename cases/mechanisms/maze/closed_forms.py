@@ -23,7 +23,7 @@ def effective_mass(mass: float, R: float, maze_inertia: float, rolling: bool) ->
 
 
 def pole(g: float, rho: float, mu: float) -> float:
-    """Unstable pole on top of an outer face, 1/s: sqrt(g/(mu rho)), which is sqrt(5 g/(7 rho)) in a locked maze."""
+    """Unstable pole on top of an outer face, 1/s: sqrt(g/(mu rho)), sqrt(5 g/(7 rho)) if locked."""
     return math.sqrt(g / (mu * rho))
 
 

@@ -1,4 +1,4 @@
-"""The maze as a scene: rings on a hinge, a ball on two slides and a hinge, and what acts between them beside."""
+"""The maze as a scene: rings on a hinge, a ball on two slides and a hinge, and what acts between."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def in_plane(case: Case, powered: bool = True, steady: bool = False) -> Form:
 
 
 def scene(case: Case, maze: Maze) -> Scene:
-    """Return bodies and shapes; gravity lies in the plane, the maze turns about its axis and weighs as a disc would."""
+    """Return bodies and shapes; gravity lies in the plane, the maze turns about its axis, heavy as a disc."""
     J, mass, r = case.number("maze_inertia"), case.number("ball_mass"), maze.ball
     spin, friction = 0.4 * mass * r * r, float(bool(case.parameters["rolling"]))
     rings = (*maze.rings, Ring(inner=maze.wall, outer=maze.wall + THICKNESS))  # the wall as thick as an added ring
@@ -78,7 +78,7 @@ def scene(case: Case, maze: Maze) -> Scene:
 
 
 def _chords(i: int, ring: Ring, friction: float) -> Iterator[Shape]:
-    """Return capsules between points of the circle amid a wall, as thick as it; their ends are the round tips."""
+    """Return capsules between points of the circle amid a wall, as thick as it, with round ends."""
     for k, (start, end) in enumerate(_arcs(ring)):
         angles = np.linspace(start, end, 1 + math.ceil((end - start) / CHORD))
         points = ring.middle * np.column_stack((np.cos(angles), np.sin(angles)))

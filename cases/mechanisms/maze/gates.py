@@ -53,7 +53,7 @@ FREE, CONTACT = 0, 1
 
 
 def guards(q: Floats, p: Floats, g: Floats) -> None:
-    """Write how far the ball is from the edges of its sectors, from the middles of the rings, and from being lost."""
+    """Write how far the ball is from its sectors' edges, from the rings' middles, and from being lost."""
     below, above = line(p, True), line(p, False)
     rho = math.sqrt(q[1] * q[1] + q[2] * q[2])
     inside = p[CHANNEL] == 0.0

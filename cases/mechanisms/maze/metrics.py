@@ -1,4 +1,4 @@
-"""What a run of the ball maze tells: ring changes, swings, and where the ball leaves the face it started on."""
+"""What a run of the ball maze tells: ring changes, swings, where the ball leaves its first face."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _leave_angle(run: Trajectory, case: Case) -> float | None:
 
 
 def _unstable_pole(run: Trajectory, case: Case) -> float | None:
-    """From delta'^2 = 2 pole^2 (cos(delta0) - cos(delta)), exact at any angle, where the ball leaves the face."""
+    """Where the ball leaves the face, by delta'^2 = 2 pole^2 (cos(delta0) - cos(delta)), exact."""
     left = leaving(run)
     if left is None:
         return None

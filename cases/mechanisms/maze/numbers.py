@@ -1,4 +1,4 @@
-"""Where the numbers of the maze's rows, gates and torque stand: constants, a table of rings, what is discrete."""
+"""Where the numbers of the maze's rows, gates and torque stand: constants, rings, what is discrete."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from crossbody.cases.mechanisms.maze.geometry import Maze, tilted_gravity
     RADIUS, DRAG, RINGS, ON, MOST_TURN, MOST_TORQUE, WN, OMEGA, BALL_MASS, BALL_INERTIA,
     MAZE_INERTIA, GRAVITY, TOP2, TOP1, TOP0, CENTRE2, CENTRE1, CENTRE0, TABLE,
 ) = range(19)  # fmt: skip
-"""Of ball and maze, then what the controller believes of them, and its gains on top of a ring and in the centre."""
+"""Of ball and maze, what the controller believes of them, its gains on a ring and in the centre."""
 INNER, OUTER, GAPS, REACH, PHASE, COLUMNS = range(6)
 """Of every ring from the centre outwards; the closed wall stands last."""
 CHANNEL, SECTOR_BELOW, SECTOR_ABOVE, CONTROL, TARGET, TOUCHING = range(-6, 0)
@@ -26,7 +26,7 @@ snatch goes to, and whether a face is touched.
 DISCRETE, LATCHED = 4, 2
 SOLID = -1
 OFF, BALANCE, SNATCH, CENTRE = range(4)
-"""Modes of the controller: no torque; on top of a ring; at a gap until the next face; at the bottom of the centre."""
+"""Modes of the controller: no torque; on top of a ring; at a gap until the next face; in the centre."""
 BELOW, ABOVE, NORMALS = 0, 3, 6
 """Rows of faces, each with both tips of a gap behind it; then those of the slip on both faces."""
 

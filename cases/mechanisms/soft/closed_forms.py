@@ -72,7 +72,7 @@ def grasp(p: Numbers, x: float = 0.0) -> tuple[Floats, Floats]:
 
 
 def touching(p: Numbers, x: float = 0.0) -> tuple[Floats, Floats]:
-    """An equilibrium with the right pad alone against the block, at zero force: the mode set of the approach."""
+    """An equilibrium with the right pad alone against the block, at zero force: the approach's mode set."""
     q, v = grasp(p, x)
     q[1] -= 0.01
     v[5] = v[6] = 0.0

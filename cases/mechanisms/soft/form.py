@@ -37,7 +37,7 @@ _MASS, _SHARE, _PROBE, _RATE = range(len(NAMES), len(NAMES) + len(_OWN))
 
 
 def smooth(t: float, start: float, stop: float) -> tuple[float, float, float]:
-    """Return the step u^3 (10 - 15 u + 6 u^2) from 0 to 1 between two instants, s, its rate and second derivative."""
+    """Return the step u^3 (10 - 15 u + 6 u^2) between two instants, s, its rate and second derivative."""
     length = stop - start
     u = min(max((t - start) / length, 0.0), 1.0)
     rate, bend = 30.0 * (u * (1.0 - u)) ** 2, 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
@@ -57,14 +57,14 @@ def jaw(p: Floats, t: float) -> Motion:
 def fingers(
     p: Floats, t: float, x: float, xd: float, pl: float, pld: float, pr: float, prd: float
 ) -> Motion:  # fmt: skip
-    """Return the forces of both fingers on their pads, N, from places and rates of the middle and of the pads."""
+    """Return the forces of both fingers on their pads, N, by places and rates of middle and pads."""
     w, wd = jaw(p, t)
     reach = w + 0.5 * p[WIDTH]
     return p[KP] * (x - reach - pl) + p[CP] * (xd - wd - pld), p[KP] * (x + reach - pr) + p[CP] * (xd + wd - prd)
 
 
 def breaks(p: Numbers, t_end: float, more: tuple[float, ...] = ()) -> tuple[float, ...]:
-    """Return where the third derivative of the jaws' motion jumps, s, and more instants, before the horizon."""
+    """Return where the jaws' third derivative jumps, s, and more instants before the horizon."""
     ends = {p["close_start"], p["close_end"], *more}
     if p["release"]:
         ends |= {p["release"], p["release"] + p["release_time"]}

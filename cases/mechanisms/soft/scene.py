@@ -50,11 +50,11 @@ COORDINATES = (
 
 
 _FELT = 0.05
-"""Part of the force of the squeeze from which on a sensor feels something: errors of 1e-12 m in a pad are 2e-8 N."""
+"""Part of the squeeze's force from which on a sensor feels: errors of 1e-12 m in a pad are 2e-8 N."""
 
 
 def coordinate(p: Mapping[str, float], name: str, unit: str) -> Coordinate:
-    """A coordinate of either variant: sensors carry momenta, whose rates are forces; the jaws set the pace."""
+    """A coordinate of either variant: sensors carry momenta; the jaws set the pace."""
     if unit == "N s":
         force = _FELT * p["kp"] * p["squeeze"]
         return Coordinate(name=name, unit=unit, size=force / p["ks"], rate=force)

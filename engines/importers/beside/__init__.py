@@ -1,1 +1,1 @@
-"""What runs beside crossbody, in an interpreter that has NumPy and the engine: it imports nothing else of ours."""
+"""What runs beside crossbody, in an interpreter that has NumPy and the engine: it imports no more of ours."""

@@ -44,7 +44,7 @@ def installed(module: Any) -> str:
 
 
 def tried(module: Any) -> str:
-    """Return a sentence on a version of the engine that no importer was tried with; empty for one that was."""
+    """Return a sentence on a version of the engine not tried with an importer; empty if tried."""
     found = installed(module)
     low, high = getattr(module, "TRIED", ("0", "999999"))
     number = [int(word) for word in re.findall(r"\d+", found)[:2]]

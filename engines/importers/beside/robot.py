@@ -20,7 +20,7 @@ UNSAID: dict[str, Any] = {
 
 
 def matched(ours: Any, theirs: Any) -> dict[str, int]:
-    """Return our joint -> number of theirs: by name; else in order on the body of that name, if the kinds agree."""
+    """Return our joint -> number of theirs: by name; else in order on that body, if kinds agree."""
     kinds = ["hinge" if joint[2] == "unbounded" else joint[2] for joint in theirs]
     found: dict[str, int] = {}
     for name, _, kind in ours:
@@ -114,7 +114,7 @@ class Measured:
         return CONVENTIONS[of.get(kind, "mujoco")](np.asarray(q, dtype=float), np.asarray(v, dtype=float))
 
     def shapes(self, named: Any) -> list[Any]:
-        """Return name, kind, joint that moves it, and boxes in the axes of that joint's body, of every shape."""
+        """Return name, kind, joint that moves it, and boxes in its body's axes, of every shape."""
         frames, told = self.robot.frames(), []
         bodies = {joint[0]: body for (_, body, _), joint in zip(self.ours, self.to, strict=True)}
         for name, kind, joint, size, points, p, R in self.robot.shapes():
@@ -123,7 +123,7 @@ class Measured:
         return told
 
     def inertias(self) -> dict[str, Any]:
-        """Return mass, centre and inertia about it of what each joint moves up to the next ones, in the body's axes."""
+        """Return mass, centre and inertia about it of what each joint alone moves, in the body's axes."""
         frames, parts = self.robot.frames(), list(self.robot.inertias())
         told = {}
         for (name, body, _), joint in zip(self.ours, self.to, strict=True):

@@ -17,7 +17,7 @@ def posed(p: Any, R: Any) -> Any:
 
 
 def boxes(kind: str, size: Any, points: Any, p: Any, R: Any, frame: Any) -> list[list[float]]:
-    """Return `bounds` of a shape as seen from four sides of a frame (p, R): one side alone would hide how it stands."""
+    """Return `bounds` of a shape from four sides of a frame (p, R): one would hide how it stands."""
     origin, axes = (np.asarray(part, dtype=float) for part in frame)
     place, turn = axes.T @ (np.asarray(p, dtype=float) - origin), axes.T @ np.asarray(R, dtype=float)
     return [bounds(kind, size, points, view @ place, view @ turn) for view in VIEWS]
