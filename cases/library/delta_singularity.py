@@ -29,10 +29,7 @@ PARAMETERS = {
     **delta.horizon(35.0),
 }
 
-VARIANTS: dict[str, dict[str, Value]] = {
-    "light": {},
-    "heavy": {**delta.HEAVY, "kp": 300.0, "kd": 30.0},
-}
+VARIANTS: dict[str, dict[str, Value]] = {"light": {}, "heavy": {**delta.HEAVY, "kp": 300.0, "kd": 30.0}}
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:

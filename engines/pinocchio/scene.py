@@ -25,14 +25,7 @@ from crossbody.engines._rubbing import why_no_steps
 from crossbody.engines._scale import depths
 from crossbody.engines.pinocchio._contacts import Points, contact_rows
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio._joined import (
-    Joined,
-    Spans,
-    Strings,
-    by_least_norm,
-    loose_rows,
-    none_pulling,
-)
+from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._native import Native, apt
 from crossbody.engines.pinocchio._rows import Chosen, PinRows, mass_matrix, point_jacobian, pose
 from crossbody.engines.pinocchio._scene import Scene as Prepared

@@ -82,11 +82,11 @@ def names(rows: Iterable[Row]) -> list[str]:
     return sorted(found, key=lambda who: order.index(who.partition(":")[0]))
 
 
-def of_engine(rows: Iterable[Row]) -> dict[str, list[Row]]:
-    """Rows of every engine."""
+def by(rows: Iterable[Row], key: str) -> dict[str, list[Row]]:
+    """Rows by the value of one column."""
     found: dict[str, list[Row]] = {}
     for row in rows:
-        found.setdefault(row["who"], []).append(row)
+        found.setdefault(row[key], []).append(row)
     return found
 
 
@@ -132,7 +132,7 @@ def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, floa
         label: of the case.
         walls: run time of each engine, s.
     """
-    engines, mine = names(rows), of_engine(rows)
+    engines, mine = names(rows), by(rows, "who")
     least = min((wall for wall in walls.values() if wall), default=0.0)
     together = [whole(label, page, who, mine[who], None) for who in engines]
     costs = [_cost(walls.get(who), least) for who in engines]

@@ -76,11 +76,7 @@ def environment() -> Environment:
         "text_packed": packed_text,
         "value_packed": packed_value,
     }
-    made.globals |= {
-        "Kind": Kind,
-        "SIGNS": SIGNS,
-        "MOST": MOST,
-    }
+    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST}
     return made
 
 

@@ -68,7 +68,7 @@ def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i:
 
 
 def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
-    mine = grid.of_engine(found.rows.get(case.label, ()))
+    mine = grid.by(found.rows.get(case.label, ()), "who")
     cells = [
         grid.whole(case.label, case.page, who, mine.get(who, ()), found.walls.get((case.label, who))) for who in shown
     ]

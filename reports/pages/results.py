@@ -12,6 +12,7 @@ from pyarrow import ArrowException
 from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import COLUMNS, Row, Word
+from crossbody.reports.pages.grid import by
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.runs.files import listed
 from crossbody.reports.runs.output import is_staged, recover
@@ -90,22 +91,14 @@ def read(out: Path, against: Path | None = None) -> Results:
     verdicts = verdicts_of(out)
     audited = read_json(out / "audit.json")["rows"]
     check_fields(out / "audit.json", audited, AUDITED)
-    audits = _by(audited, "case")
+    audits = by(audited, "case")
     cases, times = _cases(out, verdicts)
     base = None if against is None else verdicts_of(against)
     return Results(
-        out=out, verdicts=verdicts, rows=_by(verdicts, "label"), audits=audits, told=told,
+        out=out, verdicts=verdicts, rows=by(verdicts, "label"), audits=audits, told=told,
         cases=cases, walls={one: wall for one, (wall, _) in times.items()}, base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
-
-
-def _by(rows: Iterable[Row], key: str) -> dict[str, list[Row]]:
-    """Rows by the value of one column."""
-    found: dict[str, list[Row]] = {}
-    for row in rows:
-        found.setdefault(row[key], []).append(row)
-    return found
 
 
 def verdicts_of(out: Path) -> list[Row]:
@@ -150,7 +143,7 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
         abouts.setdefault(label, about)
         times[label, who] = told["wall_s"], about.get("took_s")
     labels = dict.fromkeys([*(row["label"] for row in verdicts), *paths])
-    ran = _by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
+    ran = by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
     wanted = {label: list(dict.fromkeys(row["who"] for row in rows)) for label, rows in ran.items()}
     found = tuple(
         CaseFiles(

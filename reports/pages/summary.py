@@ -50,7 +50,7 @@ def _cells(found: Results) -> dict[str, dict[str, Sequence[Row]]]:
     """Rows of every engine and, of those, of every case."""
     cells: dict[str, dict[str, Sequence[Row]]] = {}
     for label, rows in found.rows.items():
-        for who, mine in grid.of_engine(row for row in rows if row["engine"] != TRUTH).items():
+        for who, mine in grid.by((row for row in rows if row["engine"] != TRUTH), "who").items():
             cells.setdefault(who, {})[label] = mine
     return {who: cells[who] for who in grid.names({"who": who} for who in cells)}
 

@@ -11,15 +11,7 @@ from typing import Any
 import numpy as np
 
 from crossbody import engines
-from crossbody.cases import (
-    Case,
-    CaseUnsupported,
-    CrossbodyError,
-    InvalidValue,
-    Outcome,
-    Trajectory,
-    Value,
-)
+from crossbody.cases import Case, CaseUnsupported, CrossbodyError, InvalidValue, Outcome, Trajectory, Value
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.covered import covered

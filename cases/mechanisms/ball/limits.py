@@ -46,11 +46,7 @@ STEPPING = (
     "Time stepping on a rigid contact: first order, with impacts on the grid and a restitution instead of the law."
 )
 
-_KNOWN = (
-    ("mujoco", "default", OBVIOUS),
-    ("pinocchio", "impulse", IMPACT),
-    ("pinocchio", "admm", STEPPING),
-)
+_KNOWN = (("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT), ("pinocchio", "admm", STEPPING))
 # The engine at its own step against itself much finer: what remains when the model is the same.
 _STEP = (
     ("mujoco", "matched", 2e-5, 2e-5, "Runge-Kutta 4 with located events at 1 ms"),

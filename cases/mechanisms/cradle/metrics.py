@@ -115,6 +115,6 @@ METRICS = {
 SLIDING = {
     "momentum": CaseMetric(
         doc="momentum that appeared or got lost on the line, over what came in", number=_momentum, always=True
-    ),
+    )
 }
 """Of sliders alone: strings take momentum up."""
