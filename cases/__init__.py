@@ -105,8 +105,8 @@ def _warn_of_another_checkout() -> None:
         import warnings
 
         warnings.warn(
-            f"crossbody is imported from {here}, a folder of that name beside the script, instead of the editable "
-            "installation: rename the folder, or install it (pip install -e).",
+            f"crossbody is imported from {here}, a folder of that name beside the script, instead "
+            "of the editable installation: rename the folder, or install it (pip install -e).",
             RuntimeWarning, stacklevel=2,
         )  # fmt: skip
 

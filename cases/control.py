@@ -119,8 +119,9 @@ class Control:
         except (Exception, SystemExit) as error:
             done = "made" if self.factory else "copied and reset"
             raise ControlError(
-                f"The controller {self.label} cannot be {done} for a run: {_said(error)}. Every run has its own; "
-                "valid: a class, an object that can be copied deeply, or with factory=True what makes one."
+                f"The controller {self.label} cannot be {done} for a run: {_said(error)}. "
+                "Every run has its own; valid: a class, an object that can be copied deeply, "
+                "or with factory=True what makes one."
             ) from error
         if not callable(step):
             raise ControlError(f"The controller {self.label} makes {shown(step)}, which cannot be called.")

@@ -19,8 +19,8 @@ _LOCATING = (
 """Engines and profiles whose events are located between their steps."""
 _SAMPLED = "the trapezoidal rule between a run's own samples; an impact inside a step costs half its way"
 _OF_MUJOCO = (
-    "MuJoCo's own pyramids, soft contacts and step: friction creeps where it holds, pushes off the slip where it "
-    "slides, and lifts what slides fast"
+    "MuJoCo's own pyramids, soft contacts and step: friction creeps where it holds, pushes "
+    "off the slip where it slides, and lifts what slides fast"
 )
 _RIGID = (
     "rigid contacts on a grid of steps: friction begins and ends with a step, and so does what it makes of a velocity"
@@ -31,8 +31,8 @@ KNOWN = {
     ("pinocchio", "admm"): _RIGID,
     ("drake", "matched"): "stiff contacts on a grid of steps, and friction as a steep function of the slip",
     ("drake", "default"): (
-        "soft contacts, one a pair of solids, where they are deepest; friction as a function of the slip, and the "
-        "normal force of the step before"
+        "soft contacts, one a pair of solids, where they are deepest; friction as a function "
+        "of the slip, and the normal force of the step before"
     ),
     ("dart", "matched"): _BOUNDED,
     ("dart", "default"): f"{_BOUNDED}, and what rests is put to sleep",

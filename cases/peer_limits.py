@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from crossbody.cases.case import Limit
 
 MEMORYLESS = (
-    "The law as a force of the state has no memory: it ends at h = 0, has no ballistic state and makes no energy where "
-    "the law does."
+    "The law as a force of the state has no memory: it ends at h = 0, has no ballistic state "
+    "and makes no energy where the law does."
 )
 SPRINGS = "Springs and dampers that push below the surface, not the case's law: weight presses them in, uncancelled."
 PLANT = (
@@ -20,8 +20,8 @@ DISCRETE = (
 IMPACT = "Time stepping on rigid contacts: impacts on the grid, and a restitution instead of the law."
 GAMES = "Made for games: overlap is allowed, impacts come on a grid of 1/60 s, and a restitution stands for the law."
 TOGETHER = (
-    "Every pair pushes as if it were alone: balls that touch are a chain of springs, whose collisions overlap, not one "
-    "collision after another."
+    "Every pair pushes as if it were alone: balls that touch are a chain of springs, whose "
+    "collisions overlap, not one collision after another."
 )
 
 _BALL: dict[tuple[str, str], str] = {

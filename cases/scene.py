@@ -171,8 +171,9 @@ class Joint(_Named):
             raise SceneError(f"Joint {self.name!r}: a free joint has no bounds; range is {list(self.range)}.")
         if low > 0.0 or not high > max(self.margin, 0.0):
             raise SceneError(
-                f"Joint {self.name!r}: range is {list(self.range)} and margin {self.margin:g}; a ball joint has 0 and "
-                "its largest angle, rad, above the margin: at no angle nothing says which way is back."
+                f"Joint {self.name!r}: range is {list(self.range)} and margin {self.margin:g}; "
+                "a ball joint has 0 and its largest angle, rad, above the margin: at no angle "
+                "nothing says which way is back."
             )
         object.__setattr__(self, "range", (-math.inf, high))
 
@@ -360,8 +361,8 @@ def _check_loss(part: Joint | Tendon) -> None:
     """Check the bound of a part's dry friction."""
     if not 0.0 <= part.friction_loss < math.inf:
         raise SceneError(
-            f"{type(part).__name__} {part.name!r}: friction_loss is {part.friction_loss}; it must be at least 0 and "
-            "finite."
+            f"{type(part).__name__} {part.name!r}: friction_loss is {part.friction_loss}; it "
+            "must be at least 0 and finite."
         )
 
 

@@ -24,8 +24,8 @@ from crossbody.reference.start import NOT_FOUND, OffRowsError
 
 OF_THE_CASE = "case"
 _ROBOT = (
-    "IDA goes through, but factorises 24 unknowns for every step and begins anew at every tick of a controller; CVODE "
-    "is the independent check on the robot, and simulate(..., solver='ida') runs it."
+    "IDA goes through, but factorises 24 unknowns for every step and begins anew at every tick of a "
+    "controller; CVODE is the independent check on the robot, and simulate(..., solver='ida') runs it."
 )
 UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
 """(mechanism, solver) -> why it is not run."""

@@ -222,8 +222,8 @@ def check_runnable(scene: Scene) -> None:
     for loop in scene.loops:
         for name in {loop.first, loop.second} & spans if loop.type == "tendon" else ():
             raise SceneError(
-                f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple it; without=loop:"
-                f"{loop.name} leaves that out of every engine."
+                f"Tendon {name!r} runs between two points: no loop ({loop.name!r}) can couple "
+                f"it; without=loop:{loop.name} leaves that out of every engine."
             )
 
 

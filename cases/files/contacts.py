@@ -81,9 +81,9 @@ def _first(
             both = " and ".join(_named(model, geom) for geom in pair)
             return Meeting(
                 time,
-                f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for them, because "
-                f"{_why(model, pair, rubs)}. {_advice(model, pair)}without=contacts leaves all contacts out, and a "
-                "shorter t_end ends before.",
+                f"Shapes {both} come within reach at t = {time:.6g} s: the model has no row for "
+                f"them, because {_why(model, pair, rubs)}. {_advice(model, pair)}without=contacts "
+                "leaves all contacts out, and a shorter t_end ends before.",
             )
     return None
 
@@ -116,8 +116,8 @@ def _advice(model: Any, pair: tuple[int, ...]) -> str:
     if not all(bodies):
         return ""
     return (
-        f"without=pair:{':'.join(bodies)} leaves what these two bodies touch each other with out of every engine, "
-        "without=overlaps that of all that overlap in the reference pose, "
+        f"without=pair:{':'.join(bodies)} leaves what these two bodies touch each other with "
+        "out of every engine, without=overlaps that of all that overlap in the reference pose, "
     )
 
 

@@ -147,8 +147,8 @@ def _joint(model: Any, i: int) -> Joint:
     single = kind in ("slide", "hinge")
     if model.jnt_actgravcomp[i] and model.jnt_actfrclimited[i]:
         raise SceneError(
-            f"Joint {_name(model, 'jnt', i)!r} bounds the force against weight (actuatorgravcomp, actuatorfrcrange), "
-            "which a scene's joint does not; valid: one of the two."
+            f"Joint {_name(model, 'jnt', i)!r} bounds the force against weight (actuatorgravcomp, "
+            "actuatorfrcrange), which a scene's joint does not; valid: one of the two."
         )
     rest = model.qpos_spring[at : at + 1] if single else model.qpos_spring[at + (3 if kind == "free" else 0) :][:4]
     limited = bool(model.jnt_limited[i]) and _on(model, "LIMIT")
@@ -272,8 +272,8 @@ def _tendon(model: Any, i: int) -> Tendon:
         raise SceneError(f"Tendon {name!r} runs over shapes or more than two sites; a scene has two points, or joints.")
     if model.tendon_armature[i] != 0.0:
         raise SceneError(
-            f"Tendon {name!r} has armature, which a scene does not have; valid: 0, or without=tendon:{name}, which "
-            "leaves the tendon out of every engine."
+            f"Tendon {name!r} has armature, which a scene does not have; valid: 0, or "
+            f"without=tendon:{name}, which leaves the tendon out of every engine."
         )
     return Tendon(
         name=name,

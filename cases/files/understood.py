@@ -127,13 +127,14 @@ def _check_flags(option: Any) -> None:
             raise SceneError(f"The model sets the flag {flag.name}, which is not understood; valid: without it.")
     if option.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
         raise SceneError(
-            "The model overrides contact constants for all pairs (flag override), which is not understood; valid: "
-            "without it, with solref, solimp and margin at the shapes."
+            "The model overrides contact constants for all pairs (flag override), which is "
+            "not understood; valid: without it, with solref, solimp and margin at the shapes."
         )
     if option.disableactuator:
         raise SceneError(
-            "The model disables groups of actuators (actuatorgroupdisable), which is not understood; valid: none "
-            "disabled, with without=actuator:NAME for those that are to do nothing in any engine."
+            "The model disables groups of actuators (actuatorgroupdisable), which is not "
+            "understood; valid: none disabled, with without=actuator:NAME for those that are "
+            "to do nothing in any engine."
         )
 
 
@@ -142,11 +143,11 @@ def _check_options(option: Any) -> None:
     for name in ("density", "viscosity"):
         if getattr(option, name) != 0.0:
             raise SceneError(
-                f"The model moves in a medium (option {name} {getattr(option, name):g}), whose forces are not done; "
-                f"valid: {name} 0, or without=medium, which leaves it out of every engine."
+                f"The model moves in a medium (option {name} {getattr(option, name):g}), whose forces "
+                f"are not done; valid: {name} 0, or without=medium, which leaves it out of every engine."
             )
     if np.any(option.wind):
         raise SceneError(
-            "The model has wind, whose forces are not done; valid: no wind, or without=medium, which leaves it out of "
-            "every engine."
+            "The model has wind, whose forces are not done; valid: no wind, or "
+            "without=medium, which leaves it out of every engine."
         )

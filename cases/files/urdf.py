@@ -104,8 +104,9 @@ def _float(root: ElementTree.Element) -> None:
             below = above[on]
             if below.get("type") != "fixed":
                 raise SceneError(
-                    f"Joint {joint.get('name')!r} floats on {_link(joint, 'parent')!r}, which joint "
-                    f"{below.get('name')!r} moves; valid: a floating joint on the root, or on what is fixed to it."
+                    f"Joint {joint.get('name')!r} floats on {_link(joint, 'parent')!r}, which "
+                    f"joint {below.get('name')!r} moves; valid: a floating joint on the root, "
+                    "or on what is fixed to it."
                 )
             passed.add(below)
             p_on, R_on = _origin(below)

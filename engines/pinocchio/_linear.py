@@ -28,8 +28,8 @@ from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 from crossbody.reference.linear.differences import differences
 
 TURNED = (
-    "Pinocchio 4.1.0 turns the force on the second body of a constraint nv times about the first joint's axis in "
-    "ddq_dq; ddq_dv and ddq_dtau are right."
+    "Pinocchio 4.1.0 turns the force on the second body of a constraint nv times about the "
+    "first joint's axis in ddq_dq; ddq_dv and ddq_dtau are right."
 )
 CLOSE = 2e-2
 """Size of coordinates of what moves among gates, for differences, SI: these are a few of it apart."""

@@ -180,8 +180,9 @@ class RateCheck:
         dq, iv, row, t = self._worst
         unit = next((f", as of {name}" for name, ratio in UNITS.items() if abs(gain / ratio - 1.0) < OFF), "")
         text = (
-            f"over {SPAN} samples the coordinate changes by {dq:.3g} where its velocity integrates to {iv:.3g} "
-            f"(gain {gain:.3g}{unit}, correlation {alike:.2g}); is a column swapped, a unit or a sign wrong?"
+            f"over {SPAN} samples the coordinate changes by {dq:.3g} where its velocity "
+            f"integrates to {iv:.3g} (gain {gain:.3g}{unit}, correlation {alike:.2g}); is a "
+            "column swapped, a unit or a sign wrong?"
         )
         return [self._told("rates", text, row, t, fault=True)]
 
@@ -224,8 +225,8 @@ class RateCheck:
             return []
         unit = "rad/s" if self._rotates else "m/s"
         text = (
-            f"the velocity is biased by {bias:+.3g} (+- {2.0 * unsure:.2g}) {unit}: over {length:.3g} s it integrates "
-            f"to {iv:.3g} where the coordinate changes by {dq:.3g}."
+            f"the velocity is biased by {bias:+.3g} (+- {2.0 * unsure:.2g}) {unit}: over "
+            f"{length:.3g} s it integrates to {iv:.3g} where the coordinate changes by {dq:.3g}."
         )
         row, t = (self._worst[2:]) if self._worst is not None else (0, np.nan)
         return [self._told("bias", text, row, t, fault=fault)]

@@ -62,8 +62,8 @@ class ValueCheck:
             found.append(self._finite.told("finite", self._channel, text, fault=True))
         if self._outside.count and self._range is not None:
             text = (
-                f"{self._outside.count} values lie outside [{self._range[0]:.6g}, {self._range[1]:.6g}] {self._unit}; "
-                "is it the right column, in the right unit?"
+                f"{self._outside.count} values lie outside [{self._range[0]:.6g}, "
+                f"{self._range[1]:.6g}] {self._unit}; is it the right column, in the right unit?"
             )
             found.append(self._outside.told("range", self._channel, text, fault=True))
         return found + (self._about_runs() if self._measured else [])

@@ -270,6 +270,6 @@ def _about(e: Estimate, i: int, fit: Fit, active: bool, flat: Mapping[int, str])
 def _differ(one: Agreement) -> str:
     (a, b), (s, t) = one.values, one.stds
     return (
-        f"{one.name} is not the same in both halves of the data: {a:.4g} +- {s:.2g} and {b:.4g} +- {t:.2g} (standard "
-        "deviations). The model lacks something that moves it, and no interval covers that."
+        f"{one.name} is not the same in both halves of the data: {a:.4g} +- {s:.2g} and {b:.4g} +- {t:.2g} "
+        "(standard deviations). The model lacks something that moves it, and no interval covers that."
     )

@@ -166,8 +166,8 @@ class Model:
         lacking = [name for name in self.inputs if name not in given]
         if given and lacking:
             raise SceneError(
-                f"The log has the input {given[0]}, and no {', '.join(lacking)}, which drives {self.name} too; "
-                "a joint that nothing drives takes a column of zeros."
+                f"The log has the input {given[0]}, and no {', '.join(lacking)}, which drives "
+                f"{self.name} too; a joint that nothing drives takes a column of zeros."
             )
         wanted = {} if self.needs else {("coordinates", c.name): c.unit for c in self.measured}
         for (role, name), unit in (wanted | {("inputs", name): TORQUE for name in given}).items():

@@ -244,9 +244,9 @@ def conditions(t: Floats, B: Floats, rows: tuple[str, ...], names: tuple[str, ..
     told += [f"{apart[0]} does nothing"] if len(apart) == 1 else []
     told += [f"no input balances {', '.join(idle)}"] if idle else []
     raise SceneError(
-        f"{model}: {m} inputs ({', '.join(names)}) and {k} measured coordinates ({', '.join(rows)}), rank {r} {where}, "
-        f"condition {condition[at]:.2g}: {'; '.join(told)}. What is needed is one input for each coordinate, away from "
-        "singular poses."
+        f"{model}: {m} inputs ({', '.join(names)}) and {k} measured coordinates "
+        f"({', '.join(rows)}), rank {r} {where}, condition {condition[at]:.2g}: {'; '.join(told)}. "
+        "What is needed is one input for each coordinate, away from singular poses."
     )
 
 

@@ -20,8 +20,8 @@ def check_measured(system: System, seen: tuple[int, ...], name: str) -> None:
     """Raise SceneError unless the rows are always on and leave just the measured coordinates free."""
     if np.any(np.asarray(system.unilateral)) or system.n - system.nc != len(seen):
         raise SceneError(
-            f"{name}: {system.nc} rows leave {system.n - system.nc} of {system.n} coordinates free and {len(seen)} are "
-            "measured; both must be the same, and no row may open."
+            f"{name}: {system.nc} rows leave {system.n - system.nc} of {system.n} coordinates "
+            f"free and {len(seen)} are measured; both must be the same, and no row may open."
         )
 
 
@@ -49,8 +49,8 @@ def closed_by(H: NDArray[Any], others: NDArray[np.int64], right: NDArray[Any]) -
         rank = int(np.sum(s > SINGULAR * s[0]))
         free = [int(i) for i in others[np.abs(Vt[-1]) > 0.1 * np.max(np.abs(Vt[-1]))]]
         raise SceneError(
-            f"A singular pose: the {len(block)} rows have rank {rank} in the coordinates that are not measured, and "
-            f"leave coordinates {free} free; the measured ones do not tell the pose there."
+            f"A singular pose: the {len(block)} rows have rank {rank} in the coordinates that are not "
+            f"measured, and leave coordinates {free} free; the measured ones do not tell the pose there."
         ) from None
 
 

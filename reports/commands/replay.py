@@ -227,8 +227,8 @@ def _say_outside(rows: pd.DataFrame) -> None:
     for row in rows[rows["verdict"] == Word.OUTSIDE].to_dict(orient="records"):
         best = f" of {row['expected']:g}" if row["expected"] else ""
         print(
-            f"outside: {row['engine']}:{row['profile']} {row['metric']} is {row['value']:.4g} {row['unit']}, limit "
-            f"{row['limit']:.4g}{best}. {row['why']}"
+            f"outside: {row['engine']}:{row['profile']} {row['metric']} is {row['value']:.4g} "
+            f"{row['unit']}, limit {row['limit']:.4g}{best}. {row['why']}"
         )
 
 

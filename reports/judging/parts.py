@@ -195,8 +195,9 @@ def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, S
     if ratio >= LEAST_RATIO and unlike <= UNLIKE:
         return ratio, sizes[k : k + 3]
     raise NotMeasuredError(
-        f"No order between steps of {_listed(sizes[k : k + 3])} s, so nothing is extrapolated: the differences fall "
-        f"{ratio:.2g} times from one pair to the next, and {unlike:.0%} of them is not a power of the step."
+        f"No order between steps of {_listed(sizes[k : k + 3])} s, so nothing is extrapolated: "
+        f"the differences fall {ratio:.2g} times from one pair to the next, and {unlike:.0%} "
+        "of them is not a power of the step."
     )
 
 

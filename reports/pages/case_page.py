@@ -36,8 +36,8 @@ AUDIT = columns(
     verdict=("Same", Kind.VERDICT),
 )  # fmt: skip
 AUDIT_TEXT = (
-    "Before anything is compared, every engine must have the same physics. M, bias, H and lam are evaluated at the "
-    "same random states."
+    "Before anything is compared, every engine must have the same physics. M, bias, H and lam "
+    "are evaluated at the same random states."
 )
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
 

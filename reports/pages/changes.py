@@ -34,8 +34,9 @@ def changes(now: Sequence[Row], before: Sequence[Row], name: str) -> Section:
     words = [row for row in kept if row["verdict"] != row["verdict_before"]]
     moved = moves(row for row in kept if row["verdict"] == row["verdict_before"])
     text = (
-        f"Against {name}: {len(words)} of {len(kept)} verdicts changed, {len(moved)} values moved by more than "
-        f"{MOVED:.0%} of their limit, {len(here.keys() - known)} rows are new, {len(known.keys() - here)} are gone."
+        f"Against {name}: {len(words)} of {len(kept)} verdicts changed, {len(moved)} values "
+        f"moved by more than {MOVED:.0%} of their limit, {len(here.keys() - known)} rows are "
+        f"new, {len(known.keys() - here)} are gone."
     )
     tables = (
         Table(title="Verdicts that changed", columns=WORDS, rows=words),

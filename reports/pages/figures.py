@@ -218,13 +218,13 @@ def note(name: str, traces: Sequence[Trace]) -> str:
 
 NOTES = {
     "motion": (
-        "Impacts are matched first, and the arcs between them compared; the errors of their times are the metric "
-        "event_times. Differences are cut off at a common floor, the rounding error of the largest value of that unit. "
-        "Across long steps of a solver, a cubic through q and v at both ends is drawn."
+        "Impacts are matched first, and the arcs between them compared; the errors of their times are the "
+        "metric event_times. Differences are cut off at a common floor, the rounding error of the largest "
+        "value of that unit. Across long steps of a solver, a cubic through q and v at both ends is drawn."
     ),
     "force": (
-        "A small delay of an impact changes lam at one instant a lot, but hardly its impulse: judge by the impulse. "
-        "Instantaneous collisions are steps of the impulse."
+        "A small delay of an impact changes lam at one instant a lot, but hardly its impulse: "
+        "judge by the impulse. Instantaneous collisions are steps of the impulse."
     ),
 }
 FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int, Limits], Figure]]] = {

@@ -19,9 +19,10 @@ LINE = {"color": LEVEL, "dash": "dash", "width": 1}
 DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
 MOST = 1000  # points of one engine's line
 TEXT = (
-    "For the contact with the largest load. The force of a sticking contact is inside the cone, that of a sliding one "
-    "on its edge; outside, it violates Coulomb's law. In the plane of the contact, the friction force relative to mu "
-    "lam is a point of the unit disc; a sliding contact has it opposite to the slip."
+    "For the contact with the largest load. The force of a sticking contact is inside the "
+    "cone, that of a sliding one on its edge; outside, it violates Coulomb's law. In the "
+    "plane of the contact, the friction force relative to mu lam is a point of the unit disc; "
+    "a sliding contact has it opposite to the slip."
 )
 
 

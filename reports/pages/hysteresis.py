@@ -15,8 +15,8 @@ from crossbody.reports.runs.thin import keep
 
 MOST = 1500  # points of one engine's line
 TEXT = (
-    "Force over penetration depth of the contact with the largest load. A spring gives a line; damping opens it to a "
-    "loop whose area is the energy lost. A force below zero pulls."
+    "Force over penetration depth of the contact with the largest load. A spring gives a "
+    "line; damping opens it to a loop whose area is the energy lost. A force below zero pulls."
 )
 
 

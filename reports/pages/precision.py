@@ -15,17 +15,17 @@ from crossbody.reports.runs.study import read_json
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")
 FLOOR = 1e-16
 RUNS = (
-    "Each engine once, at its own setting; lower left is better. An engine without a position to compare is not shown; "
-    "one whose error is not finite is a cross at the right edge. For whole lines over ladders of tolerances and steps, "
-    "run crossbody bench, then crossbody report --with."
+    "Each engine once, at its own setting; lower left is better. An engine without a position to "
+    "compare is not shown; one whose error is not finite is a cross at the right edge. For whole "
+    "lines over ladders of tolerances and steps, run crossbody bench, then crossbody report --with."
 )
 ALL = (
-    "Every engine on every case, each at its own setting; lower left is better. Click a name in the legend to hide "
-    "that engine, double-click to show it alone."
+    "Every engine on every case, each at its own setting; lower left is better. Click a name "
+    "in the legend to hide that engine, double-click to show it alone."
 )
 LADDERS = (
-    "One line for each engine, with a point for every tolerance or step; lower left is better. Choose an error, then "
-    "go up: the lowest line there is the fastest engine for that accuracy."
+    "One line for each engine, with a point for every tolerance or step; lower left is better. "
+    "Choose an error, then go up: the lowest line there is the fastest engine for that accuracy."
 )
 
 

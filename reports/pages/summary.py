@@ -18,14 +18,14 @@ from crossbody.reports.runs.study import read_json
 
 REFERENCE = "reference:compiled"
 TEXT = (
-    "A case is trusted with an engine if everything that is judged is within its limit. Errors are of position, "
-    "relative to its largest value. Run times are relative to those of reference:compiled for the same case, each at "
-    "its own setting and therefore at its own error; for the cost of the same error, run a benchmark (crossbody bench, "
-    "then crossbody report --with)."
+    "A case is trusted with an engine if everything that is judged is within its limit. Errors are "
+    "of position, relative to its largest value. Run times are relative to those of "
+    "reference:compiled for the same case, each at its own setting and therefore at its own error; "
+    "for the cost of the same error, run a benchmark (crossbody bench, then crossbody report --with)."
 )
 BENCH = (
-    "At its best error: the run time of the engine relative to that of the cheapest run of the reference that is at "
-    "least as accurate, median over the timed cases."
+    "At its best error: the run time of the engine relative to that of the cheapest run of "
+    "the reference that is at least as accurate, median over the timed cases."
 )
 COLUMNS = columns(
     who="Engine", worst=("Worst", Kind.VERDICT), within=("Cases trusted", Kind.NUMBER),

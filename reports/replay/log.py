@@ -107,8 +107,8 @@ def _show_group(group: GroupSurvey) -> None:
     if math.isfinite(group.step) and group.step > 0:
         clock = printable(group.clock.column) if group.clock else "the file's own steps"
         print(
-            f"{title}{group.rows} rows over {group.duration:.6g} s by {clock}: {1 / group.step:.6g} Hz, longest step "
-            f"{group.longest:.3g} s, {group.lost} samples missing, jitter {group.jitter:.2g} s"
+            f"{title}{group.rows} rows over {group.duration:.6g} s by {clock}: {1 / group.step:.6g} Hz, "
+            f"longest step {group.longest:.3g} s, {group.lost} samples missing, jitter {group.jitter:.2g} s"
         )
     else:
         print(f"{title}{group.rows} rows, no column of times found")

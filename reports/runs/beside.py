@@ -27,8 +27,8 @@ def tables(folder: Path) -> list[Path]:
     found = [path for path in paths if path.suffix in TABLES and path.stem not in OWN]
     if not found:
         raise OutputError(
-            f"{folder} holds no study: name a folder that crossbody bench, stress, gapmap, stability, bode, analyse, "
-            "replay or identify wrote."
+            f"{folder} holds no study: name a folder that crossbody bench, stress, gapmap, "
+            "stability, bode, analyse, replay or identify wrote."
         )
     return found
 

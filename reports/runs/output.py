@@ -97,8 +97,8 @@ def _check_content(path: Path, study: str) -> None:
     other = known.judged()
     if study in JUDGED and other not in ("", study):
         raise OutputError(
-            f"Output folder {path} holds the verdicts of `crossbody {other}`, which `crossbody {study}` would replace; "
-            f"name another folder, for example --out {path / study}."
+            f"Output folder {path} holds the verdicts of `crossbody {other}`, which `crossbody "
+            f"{study}` would replace; name another folder, for example --out {path / study}."
         )
     fixed = ("index.html", "verdicts.json", "verdicts.csv", "verdicts.parquet", "provenance.json")
     for name in fixed if (path / MARKER).is_file() else ():

@@ -10,15 +10,16 @@ RATIOS = columns(
 )  # fmt: skip
 SKIP_TEXT = "Ratios compare the shortest of interleaved runs. Counts are from one run, and are the same every time."
 THROUGHPUT_TEXT = (
-    "Ratios of runs per second, interleaved on the same cores. Two threads are judged only if two busy threads get two "
-    "cores of the machine."
+    "Ratios of runs per second, interleaved on the same cores. Two threads are judged only if "
+    "two busy threads get two cores of the machine."
 )
 ANALYSIS_TEXT = (
-    "Linear models about the equilibria of the case, in the named modes, by exact derivatives of the equations. Rows "
-    "that hold are eliminated, so that their law adds no poles, unless the law itself is studied. Where a contact "
-    "slides, nothing stands: the model is that of the equations about the motion. A pole with a positive real part "
-    "grows, one with a negative real part decays. Linear stability does not show that an equilibrium is reached. "
-    "Engines are judged by their largest difference from the reference: in the derivatives of the accelerations, each "
+    "Linear models about the equilibria of the case, in the named modes, by exact derivatives of "
+    "the equations. Rows that hold are eliminated, so that their law adds no poles, unless the law "
+    "itself is studied. Where a contact slides, nothing stands: the model is that of the equations "
+    "about the motion. A pole with a positive real part grows, one with a negative real part "
+    "decays. Linear stability does not show that an equilibrium is reached. Engines are judged by "
+    "their largest difference from the reference: in the derivatives of the accelerations, each "
     "row relative to its largest entry, and in the poles, relative to their modulus."
 )
 ANALYSIS_TABLES = (
@@ -43,18 +44,18 @@ ANALYSIS_TABLES = (
     )),
 )  # fmt: skip
 BODE_TEXT = (
-    "The block held by both fingers, about the grasp: from the velocity of the fingers to the difference of the "
-    "contact forces and to the velocity of the block. Derivatives of the model are exact in the modes of the grasp. "
-    "The table has the largest real part of the poles, except for the two at 0: the common shift of the fingers, and "
-    "the quantity that the tactile loop conserves. Below 0 the loop is stable about an equilibrium; whether an "
-    "approach is stable, only a run can show."
+    "The block held by both fingers, about the grasp: from the velocity of the fingers to the "
+    "difference of the contact forces and to the velocity of the block. Derivatives of the model are "
+    "exact in the modes of the grasp. The table has the largest real part of the poles, except for the "
+    "two at 0: the common shift of the fingers, and the quantity that the tactile loop conserves. Below "
+    "0 the loop is stable about an equilibrium; whether an approach is stable, only a run can show."
 )
 GROWTHS = columns(mode="Modes", kstar=("k* [cm/(s N)]", Kind.NUMBER), growth=("Growth [1/s]", Kind.NUMBER))
 BENCH_TEXT = (
-    "Models are built and warm before they are timed; engines are interleaved; times are medians with interquartile "
-    "range. Failed runs are shown as crosses. An engine that follows another law is judged against the truth of that "
-    "law. Compare ratios, since seconds depend on the machine. The whole call includes the Python call and the "
-    "trajectory that it builds."
+    "Models are built and warm before they are timed; engines are interleaved; times are "
+    "medians with interquartile range. Failed runs are shown as crosses. An engine that follows "
+    "another law is judged against the truth of that law. Compare ratios, since seconds depend "
+    "on the machine. The whole call includes the Python call and the trajectory that it builds."
 )
 ORDERS = columns(
     case="Case", who="Engine", knob="Setting", order=("Observed order", Kind.NUMBER),
@@ -73,11 +74,12 @@ TIMINGS = columns(
     repeats=("Repeats", Kind.NUMBER), outcome="Outcome",
 )  # fmt: skip
 HEADLINE_TEXT = (
-    "For each engine, its best error and the run time there, compared with the cheapest run of the compiled reference "
-    "that is at least as accurate. The least ratio is the smallest over all errors that the engine reaches. Errors "
-    "below 1e-13, or below the accuracy of a truth of tier C, count as equal to it. An engine that follows another law "
-    "is judged against the truth of that law. The table says which parts of an engine's run are Python; its own loop "
-    "makes the same steps natively, without recording, events and the parts of the law that are Python."
+    "For each engine, its best error and the run time there, compared with the cheapest run of "
+    "the compiled reference that is at least as accurate. The least ratio is the smallest over "
+    "all errors that the engine reaches. Errors below 1e-13, or below the accuracy of a truth of "
+    "tier C, count as equal to it. An engine that follows another law is judged against the truth "
+    "of that law. The table says which parts of an engine's run are Python; its own loop makes "
+    "the same steps natively, without recording, events and the parts of the law that are Python."
 )
 HEADLINE = columns(
     case="Case", who="Engine", tier="Tier", against="Against the truth of",
@@ -88,11 +90,12 @@ HEADLINE = columns(
     ahead="Ahead at every error", says=("Says", Kind.LONG),
 )  # fmt: skip
 CONFORMANCE_TEXT = (
-    "One file for each feature. Every engine's own reader reads it in a separate process, and the result is compared "
-    "with a scene written by hand: coordinates, inertias, M, gravity, bias, energy and frames at random states, or the "
-    "quantities that the feature concerns. ok: equal to 1e-9 (2e-4 for a reader in single precision). unsupported: the "
-    "engine reports that it ignores the feature, or has no such feature. not shown: it may have it, but does not "
-    "expose it. wrong: it reads something else without a warning. failed: it gives up."
+    "One file for each feature. Every engine's own reader reads it in a separate process, and "
+    "the result is compared with a scene written by hand: coordinates, inertias, M, gravity, "
+    "bias, energy and frames at random states, or the quantities that the feature concerns. ok: "
+    "equal to 1e-9 (2e-4 for a reader in single precision). unsupported: the engine reports "
+    "that it ignores the feature, or has no such feature. not shown: it may have it, but does "
+    "not expose it. wrong: it reads something else without a warning. failed: it gives up."
 )
 DETAILS = columns(
     feature="Feature", engine="Engine", version="Version", verdict=("Verdict", Kind.VERDICT),
@@ -101,10 +104,10 @@ DETAILS = columns(
     rewrite=("How all agree", Kind.LONG), text=("File", Kind.CODE),
 )  # fmt: skip
 GAPS_TEXT = (
-    "Elastic sliders, hit by one ball; s = gap sqrt(a0) / v is the gap relative to the deepest penetration of one "
-    "pair. If collisions overlap, the law itself creates energy, and the pattern is not the ideal one; each row gives "
-    "the gap from which on an engine reproduces it. All values are relative to the energy of the first ball. Failed "
-    "runs are shown as crosses."
+    "Elastic sliders, hit by one ball; s = gap sqrt(a0) / v is the gap relative to the deepest "
+    "penetration of one pair. If collisions overlap, the law itself creates energy, and the "
+    "pattern is not the ideal one; each row gives the gap from which on an engine reproduces it. "
+    "All values are relative to the energy of the first ball. Failed runs are shown as crosses."
 )
 GAPS = columns(
     n=("Balls", Kind.NUMBER), who="Engine", machine="Law or rule", most=("Most energy created", Kind.NUMBER),
@@ -112,8 +115,9 @@ GAPS = columns(
     failed=("Failed", Kind.NUMBER), why=("Says", Kind.LONG),
 )  # fmt: skip
 STABILITY_TEXT = (
-    "The closed loop with one change at a time: bounds, gains, the model inside the controller, the initial state, "
-    "sampling and noise. If the ball tumbles through several rings, either outcome is possible."
+    "The closed loop with one change at a time: bounds, gains, the model inside the "
+    "controller, the initial state, sampling and noise. If the ball tumbles through several "
+    "rings, either outcome is possible."
 )
 STABILITY = columns(
     who="Engine", scene="Scene", expected="Published", outcome="Outcome",
@@ -121,17 +125,17 @@ STABILITY = columns(
     changes=("Rings passed", Kind.NUMBER), why=("Says", Kind.LONG),
 )  # fmt: skip
 STRESS_TEXT = (
-    "Quasi-random and gridded extreme scenes, each bounded in steps and time. A run is outside if it raised an "
-    "exception, leaked a warning or returned a value that is not a number; the reference also if its error against a "
-    "truth of tier A to C, or the residual of its energy account, exceeds its limit. Failures of engines are shown "
-    "with their outcome."
+    "Quasi-random and gridded extreme scenes, each bounded in steps and time. A run is outside "
+    "if it raised an exception, leaked a warning or returned a value that is not a number; the "
+    "reference also if its error against a truth of tier A to C, or the residual of its energy "
+    "account, exceeds its limit. Failures of engines are shown with their outcome."
 )
 MAPPED_TEXT = (
     "Largest error over damping ratios 0 to 10, by stiffness and by tolerance or step; a cross marks a failed run."
 )
 SMALL_TEXT = (
-    "The first failure of every kind, with its parameters moved towards the defaults of the case as far as it still "
-    "fails in the same way; the command repeats it."
+    "The first failure of every kind, with its parameters moved towards the defaults of the "
+    "case as far as it still fails in the same way; the command repeats it."
 )
 SUITES = columns(
     suite="Suite", who="Engine", runs=("Runs", Kind.NUMBER), finished=("Finished", Kind.NUMBER),

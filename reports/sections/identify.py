@@ -25,9 +25,10 @@ HELD = columns(
     change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 PROFILE = (
-    "The profile is the increase of the cost (sum of squares) when one parameter is moved and all others are fitted "
-    "again. If it is a symmetric parabola, the intervals from derivatives can be trusted; if it is flat or "
-    "asymmetric, they cannot. The data hardly separate parameters whose correlation is near 1 or -1."
+    "The profile is the increase of the cost (sum of squares) when one parameter is moved and "
+    "all others are fitted again. If it is a symmetric parabola, the intervals from "
+    "derivatives can be trusted; if it is flat or asymmetric, they cannot. The data hardly "
+    "separate parameters whose correlation is near 1 or -1."
 )
 
 

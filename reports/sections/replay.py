@@ -11,9 +11,10 @@ from crossbody.reports.runs.study import read_json
 
 TITLE = "Replay"
 TEXT = (
-    "In each window the model starts from the measured state and is driven by the recorded inputs, held between their "
-    "recorded times. Residuals are averaged over a twelfth of the motion's period; if they are noise, plus an error no "
-    "larger than the noise of one sample, 99 of 100 correlations lie within the band. Grey bands are two standard "
+    "In each window the model starts from the measured state and is driven by the recorded "
+    "inputs, held between their recorded times. Residuals are averaged over a twelfth of the "
+    "motion's period; if they are noise, plus an error no larger than the noise of one "
+    "sample, 99 of 100 correlations lie within the band. Grey bands are two standard "
     "deviations of the measurement noise; windows held out of an identification are shaded."
 )
 METRICS = columns(

@@ -49,10 +49,10 @@ class Signal:
             return ""
         first, worst = int(np.argmax(bad)), int(np.argmax(np.where(bad, np.where(np.isnan(off), np.inf, off), -1.0)))
         return (
-            f"{self.name} is off first at t = {self.t[first]:.9g} s: {self.found[first]:.9g} where "
-            f"{self.wanted[first]:.9g} is expected, a difference of {off[first]:.3g} where {self.allowed:.3g} is "
-            f"allowed ({self.basis}); the worst is {off[worst]:.3g} at t = {self.t[worst]:.9g} s, and "
-            f"{int(bad.sum())} of {len(bad)} samples are off."
+            f"{self.name} is off first at t = {self.t[first]:.9g} s: {self.found[first]:.9g} "
+            f"where {self.wanted[first]:.9g} is expected, a difference of {off[first]:.3g} "
+            f"where {self.allowed:.3g} is allowed ({self.basis}); the worst is {off[worst]:.3g} "
+            f"at t = {self.t[worst]:.9g} s, and {int(bad.sum())} of {len(bad)} samples are off."
         )
 
 
@@ -130,8 +130,8 @@ def _touches(run: Trajectory, truth: Trajectory, late: float) -> list[str]:
     for i, (a, b) in enumerate(zip(mine, theirs, strict=False)):
         if a.row != b.row or not abs(a.touch - b.touch) <= late:
             return [
-                f"Touch {i} is of row {a.row} at t = {a.touch:.9g} s where row {b.row} at t = {b.touch:.9g} s is "
-                f"expected; {late:.3g} s are allowed."
+                f"Touch {i} is of row {a.row} at t = {a.touch:.9g} s where row {b.row} at t = "
+                f"{b.touch:.9g} s is expected; {late:.3g} s are allowed."
             ]
     if len(mine) == len(theirs):
         return []
@@ -185,8 +185,8 @@ def _account(run: Trajectory) -> Floats:
     """Energy that everything outside the integrator has brought since the start (n,), J."""
     if run.ledger is None:
         raise InvalidValue(
-            "The run keeps no energy account: prepare it with ledger=True where the engine has that setting, or hold "
-            "it against its start with conserved=True."
+            "The run keeps no energy account: prepare it with ledger=True where the engine "
+            "has that setting, or hold it against its start with conserved=True."
         )
     book: Floats = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
     brought: Floats = book - book[0]

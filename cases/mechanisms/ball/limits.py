@@ -39,8 +39,8 @@ CLAIMS = {
 
 OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and a step of 2 ms, not the case's law."
 IMPACT = (
-    "An impact in no time has no contact phase: a restitution replaces the law, so the ball neither sinks in nor stays "
-    "for the contact time, and weight does not act during it."
+    "An impact in no time has no contact phase: a restitution replaces the law, so the ball "
+    "neither sinks in nor stays for the contact time, and weight does not act during it."
 )
 STEPPING = (
     "Time stepping on a rigid contact: first order, with impacts on the grid and a restitution instead of the law."

@@ -8,12 +8,12 @@ from crossbody.cases import peer_limits
 from crossbody.cases.case import Claim, Limit
 
 TOGETHER = (
-    "It integrates the law of all contacts together: balls that touch act as one block, and where collisions overlap "
-    "the law itself makes energy."
+    "It integrates the law of all contacts together: balls that touch act as one block, and "
+    "where collisions overlap the law itself makes energy."
 )
 OBVIOUS = (
-    "The obvious model: spheres with friction, an elastic contact that MuJoCo's own step of 2 ms just resolves (solref "
-    "-10000 0) and Euler's method, not the case's law."
+    "The obvious model: spheres with friction, an elastic contact that MuJoCo's own step of 2 "
+    "ms just resolves (solref -10000 0) and Euler's method, not the case's law."
 )
 AT_ONCE = "All impacts are solved together, as a complementarity problem: touching balls act as one block."
 IN_TURN = "Impacts come one after another, in no time: what the ideal cradle does, not what this rule asks for."

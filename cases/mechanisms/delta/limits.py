@@ -7,8 +7,9 @@ from collections.abc import Iterator, Mapping
 from crossbody.cases.case import Limit
 
 SOFT = (
-    "The obvious model has MuJoCo's own equality constants (solref 0.02 1), its regularisation and a step of 2 ms, not "
-    "the closures' law: tips stay some tenths of a millimetre apart and lam is off by percents."
+    "The obvious model has MuJoCo's own equality constants (solref 0.02 1), its "
+    "regularisation and a step of 2 ms, not the closures' law: tips stay some tenths of a "
+    "millimetre apart and lam is off by percents."
 )
 _TIGHT = "tolerances of 1e-9 and 1e-10 and steps of 1 ms leave less than this on a smooth motion"
 _TOLERANCE, _GROWTH, _ADDED = 1e-9, 2e3, 50.0

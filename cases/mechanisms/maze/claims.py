@@ -90,8 +90,8 @@ ARRIVED = 60.0  # from when on the default run is at rest in the centre, s
 
 
 OBVIOUS = (
-    "The obvious model builds rings of segments and has MuJoCo's own contact constants and friction, not the case's "
-    "law: it rolls over facets, sinks in and slips."
+    "The obvious model builds rings of segments and has MuJoCo's own contact constants and "
+    "friction, not the case's law: it rolls over facets, sinks in and slips."
 )
 _TOLERANCE = "a thousand times the default tolerance of 1e-9"
 _LOG = "read between the samples of a run"
@@ -109,8 +109,8 @@ _CLAIMED: Mapping[str, tuple[float, str]] = {
 """Judged where the case claims a number."""
 _ALWAYS: Mapping[str, tuple[float, str]] = {"ring_change_times": (1e-6, _TOLERANCE)}
 _MULTISTEP = (
-    "backward differentiation errs by the tolerance of 1e-9 in every step, at worst always to one side, and takes up "
-    "to 20,000 of them in stiff contact"
+    "backward differentiation errs by the tolerance of 1e-9 in every step, at worst always to "
+    "one side, and takes up to 20,000 of them in stiff contact"
 )
 
 

@@ -158,8 +158,9 @@ def _check_ring(ring: Ring, i: int) -> None:
     room = 2.0 * math.pi / ring.gaps if ring.gaps else math.inf
     if 2.0 * ring.reach >= room:
         raise InvalidValue(
-            f"Ring {i}: {ring.gaps} gaps of {math.degrees(ring.width):g} deg with their rounded tips cover the whole "
-            f"ring; valid: width{i} below {math.degrees(room - 2.0 * math.asin(ring.cap / ring.middle)):.6g} deg."
+            f"Ring {i}: {ring.gaps} gaps of {math.degrees(ring.width):g} deg with their "
+            f"rounded tips cover the whole ring; valid: width{i} below "
+            f"{math.degrees(room - 2.0 * math.asin(ring.cap / ring.middle)):.6g} deg."
         )
 
 
@@ -175,8 +176,8 @@ def _check_channels(maze: Maze) -> None:
             )
         if inner - outer <= 2.0 * maze.ball:
             raise InvalidValue(
-                f"The ball of radius {maze.ball:g} m is wider than the channel between ring {i} and {outside}; "
-                f"valid: ball_radius below {0.5 * (inner - outer):g} m."
+                f"The ball of radius {maze.ball:g} m is wider than the channel between ring "
+                f"{i} and {outside}; valid: ball_radius below {0.5 * (inner - outer):g} m."
             )
     if maze.rings[0].inner <= maze.ball:
         raise InvalidValue(
@@ -189,8 +190,9 @@ def _check_passages(maze: Maze) -> None:
     for i, ring in enumerate(maze.rings):
         if ring.gaps and ring.free_width <= 2.0 * maze.ball:
             raise InvalidValue(
-                f"The ball of radius {maze.ball:g} m is wider than the gaps of ring {i}, which leave "
-                f"{ring.free_width:g} m; valid: ball_radius below {0.5 * ring.free_width:g} m, or a wider gap."
+                f"The ball of radius {maze.ball:g} m is wider than the gaps of ring {i}, which "
+                f"leave {ring.free_width:g} m; valid: ball_radius below "
+                f"{0.5 * ring.free_width:g} m, or a wider gap."
             )
 
 

@@ -7,21 +7,21 @@ from collections.abc import Iterable, Iterator, Mapping
 from crossbody.cases.case import Claim, Limit
 
 REAL_TIME = (
-    "It integrates collisions in real time: while one lasts, bodies move and gravity acts, so that velocities behind "
-    "it differ from those of a collision in no time as b0^(-1/2)."
+    "It integrates collisions in real time: while one lasts, bodies move and gravity acts, so "
+    "that velocities behind it differ from those of a collision in no time as b0^(-1/2)."
 )
 IN_NO_TIME = (
-    "Collisions take no time: what moves and what gravity does while one lasts is missing, as b0^(-1/2), and so are "
-    "the pulses of lam."
+    "Collisions take no time: what moves and what gravity does while one lasts is missing, as "
+    "b0^(-1/2), and so are the pulses of lam."
 )
 RIGID = "A restitution stands for the constants of COLLISION, and a rigid row for those of CONTACT."
 STEPPING = (
-    "Time stepping at 1 ms with the restitution of each row: first order, no capture and no second set of constants; "
-    "the left corner hops once before it rests."
+    "Time stepping at 1 ms with the restitution of each row: first order, no capture and no "
+    "second set of constants; the left corner hops once before it rests."
 )
 OBVIOUS = (
-    "The obvious model has MuJoCo's own contact constants (solref 0.02 1), one set for all, and a step of 2 ms: the "
-    "left corner is not let go when the right one lands."
+    "The obvious model has MuJoCo's own contact constants (solref 0.02 1), one set for all, "
+    "and a step of 2 ms: the left corner is not let go when the right one lands."
 )
 
 Bounds = Mapping[str, tuple[float, str]]

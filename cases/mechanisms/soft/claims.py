@@ -60,9 +60,9 @@ _BOUNDS = {
 
 
 OBVIOUS = (
-    "The obvious model has MuJoCo's own contact constants (solref 0.02 1), whose stiffness goes with the mass that "
-    "they join: against pads of 10 g the one place where two balls touch gives way by all but a fortieth of the "
-    "squeeze and holds 0.05 N, not 2 N. Nothing is located within its step of 2 ms."
+    "The obvious model has MuJoCo's own contact constants (solref 0.02 1), whose stiffness goes with the "
+    "mass that they join: against pads of 10 g the one place where two balls touch gives way by all but "
+    "a fortieth of the squeeze and holds 0.05 N, not 2 N. Nothing is located within its step of 2 ms."
 )
 _ALWAYS = {"axis": ("velocity",), "delta": ("velocity", "energy_drift")}
 STEP = 1.5  # step of Runge-Kutta 4 in the matched model, in time constants of a pad

@@ -40,8 +40,8 @@ def check(p: Mapping[str, float]) -> None:
     """
     if p["rise"] < p["descent"]:
         raise InvalidValue(
-            f"soft_contact: rise is {p['rise']:g} s; the flange comes down until descent = {p['descent']:g} s, "
-            "so it must be at least that."
+            f"soft_contact: rise is {p['rise']:g} s; the flange comes down until descent = "
+            f"{p['descent']:g} s, so it must be at least that."
         )
 
 

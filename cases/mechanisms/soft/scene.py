@@ -77,8 +77,8 @@ def check(p: Mapping[str, float]) -> None:
     """
     if not p["close_end"] > p["close_start"]:
         raise InvalidValue(
-            f"soft_contact: close_end is {p['close_end']:g} s; the jaws begin to close at {p['close_start']:g} s, "
-            "so it must be later."
+            f"soft_contact: close_end is {p['close_end']:g} s; the jaws begin to close at "
+            f"{p['close_start']:g} s, so it must be later."
         )
     if p["release"] and p["release"] < p["close_end"]:
         raise InvalidValue(
