@@ -145,8 +145,8 @@ def _check_coupled(at: State) -> None:
     if np.any(apart):
         where, value = entry("M", apart), at.M[apart][0]
         raise SceneError(
-            f"Kernel dynamics gives {where} = {value:.9g}, though by System.above neither coordinate is above the "
-            f"other{at.where()}."
+            f"Kernel dynamics gives {where} = {value:.9g}, though by System.above neither "
+            f"coordinate is above the other{at.where()}."
         )
 
 
@@ -251,8 +251,8 @@ def _check_rates(at: State, draw: Any) -> None:
         if np.any(moved):
             i = int(np.flatnonzero(moved)[0])
             raise SceneError(
-                f"Kernel velocity gives q' = {rest.tolist()} at v = 0, along which gap {i} changes; gaps must stand "
-                f"still there, h' = H v{at.where()}."
+                f"Kernel velocity gives q' = {rest.tolist()} at v = 0, along which gap {i} "
+                f"changes; gaps must stand still there, h' = H v{at.where()}."
             )
 
 
@@ -316,8 +316,9 @@ def _check_time(first: State, times: list[float]) -> None:
         if np.any(moved):
             i = int(np.flatnonzero(moved)[0])
             raise SceneError(
-                f"Kernel gaps gives h[{i}] = {first.gap[i]:.9g} at t = 0 and {then[i]:.9g} at t = {t:.9g} s at the "
-                "same q; gaps must not depend on time. Make the wall a coordinate of its own, which a force moves."
+                f"Kernel gaps gives h[{i}] = {first.gap[i]:.9g} at t = 0 and {then[i]:.9g} at "
+                f"t = {t:.9g} s at the same q; gaps must not depend on time. Make the wall a "
+                "coordinate of its own, which a force moves."
             )
 
 

@@ -61,9 +61,10 @@ class Rank:
         near = ", ".join(f"{names[self.order[i]]!r} ({self.pivots[i]:.1e})" for i in range(sure, most))
         done = f"{count} of {len(self.order)} rows hold"
         return (
-            f"near_dependent: a pivot between {ROUNDED:g} and {INDEPENDENT:g} of the first has {near}. Left out, such "
-            "rows follow from the others and the mechanism moves; kept, each takes a degree of freedom, and it may "
-            f"lock. Here {done}; rank (--rank) decides: from {sure}, none of them, to {most}, all of them."
+            f"near_dependent: a pivot between {ROUNDED:g} and {INDEPENDENT:g} of the first has "
+            f"{near}. Left out, such rows follow from the others and the mechanism moves; "
+            f"kept, each takes a degree of freedom, and it may lock. Here {done}; rank "
+            f"(--rank) decides: from {sure}, none of them, to {most}, all of them."
         )
 
 
@@ -86,8 +87,9 @@ def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
     least, ways = np.linalg.eigh(M)
     if not least[0] > 0.0:
         raise SceneError(
-            f"The mass matrix is not positive definite at the start: its least eigenvalue is {least[0]:.3g}, and what "
-            f"moves there without a mass is above all velocity {int(np.abs(ways[:, 0]).argmax())}, counted from 0."
+            "The mass matrix is not positive definite at the start: its least eigenvalue is "
+            f"{least[0]:.3g}, and what moves there without a mass is above all velocity "
+            f"{int(np.abs(ways[:, 0]).argmax())}, counted from 0."
         )
     root = np.linalg.cholesky(M)
     H = state.H[rows]
@@ -130,8 +132,8 @@ def watched(system: System, run: Trajectory) -> Trajectory:
             k, j = np.argwhere(off > bound)[0]
             row = int(left_out[j])
             message = (
-                f"{Outcome.INCONSISTENT.advice} Row {row} followed from the others at the start and was left out; "
-                f"at t = {run.t[k]:.12g} s it has {what} = {values[k, row]:.3g}."
+                f"{Outcome.INCONSISTENT.advice} Row {row} followed from the others at the start "
+                f"and was left out; at t = {run.t[k]:.12g} s it has {what} = {values[k, row]:.3g}."
             )
             return replace(run, outcome=Outcome.INCONSISTENT, message=message)
     lam, mode = np.array(run.lam), np.array(run.mode)

@@ -53,8 +53,8 @@ _NOTES = {
     "the one that was reached first was taken.",
 }
 _LOOPS_PRESS = (
-    "indeterminate: loops hold a contact that may slide, so that no law says how hard it presses, nor its friction; it "
-    "was taken without any."
+    "indeterminate: loops hold a contact that may slide, so that no law says how hard it "
+    "presses, nor its friction; it was taken without any."
 )
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 

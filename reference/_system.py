@@ -240,8 +240,8 @@ class System:
             rows = np.flatnonzero(slides & (follows == normal))
             if len(rows) > 2 or rows[-1] - rows[0] != len(rows) - 1 or len(set(given[rows].tolist())) > 1:
                 raise SceneError(
-                    f"Rows {rows.tolist()} follow row {normal} with mu = {given[rows].tolist()}; it has one or two "
-                    "tangential rows, one behind the other, of one mu."
+                    f"Rows {rows.tolist()} follow row {normal} with mu = {given[rows].tolist()}; "
+                    "it has one or two tangential rows, one behind the other, of one mu."
                 )
             if follows[normal] >= 0 or not np.asarray(self.unilateral)[normal]:
                 raise SceneError(f"Row {normal} has friction; it must be able to open and follow no other.")
@@ -252,8 +252,8 @@ class System:
         if np.any(wrong):
             row = int(np.flatnonzero(wrong)[0])
             raise SceneError(
-                f"Row {row} has dry friction of its own (System.friction_loss): it must be no row that is always on, "
-                "follow no other, and none may follow it."
+                f"Row {row} has dry friction of its own (System.friction_loss): it must be no "
+                "row that is always on, follow no other, and none may follow it."
             )
         put(self, "follows", np.where(dry, own, follows))  # it is its own tangential row
         if not np.all(np.isfinite(drift)) or np.any(drift[~(slides | dry)] != 0.0):
@@ -318,8 +318,8 @@ class System:
     def _check_kinks(self) -> None:
         if self.kinks > min(np.size(self.discrete), self.guards) or (self.kinks and self.latched <= self.inputs):
             raise SceneError(
-                f"System.kinks is {self.kinks}; each needs a discrete variable and a guard, and `latched` room for the "
-                f"{self.inputs} inputs and the tolerance."
+                f"System.kinks is {self.kinks}; each needs a discrete variable and a guard, "
+                f"and `latched` room for the {self.inputs} inputs and the tolerance."
             )
 
     def _check_told(self) -> None:
@@ -352,8 +352,8 @@ class System:
         put(self, "nq", self.nq or n)
         if self.nq < n or (self.nq > n and self.velocity is None):
             raise SceneError(
-                f"System.nq is {self.nq} and System.n is {n}; valid: as many positions as velocities, or more with the "
-                "kernel velocity, q' = N(q) v."
+                f"System.nq is {self.nq} and System.n is {n}; valid: as many positions as "
+                "velocities, or more with the kernel velocity, q' = N(q) v."
             )
         if self.affine and self.velocity is not None:
             raise SceneError("System.affine is true, but with a kernel velocity q' is not v: no arc has a closed form.")
@@ -363,8 +363,8 @@ class System:
             raise SceneError("System.quaternions are given without the kernel velocity, which turns them.")
         if len(entries) and (entries.min() < 0 or entries.max() >= self.nq or len(np.unique(entries)) < len(entries)):
             raise SceneError(
-                f"System.quaternions is {np.asarray(self.quaternions).tolist()}; each is the first of four entries of "
-                f"its own, below nq = {self.nq}."
+                f"System.quaternions is {np.asarray(self.quaternions).tolist()}; each is the "
+                f"first of four entries of its own, below nq = {self.nq}."
             )
 
     def _check_values(self) -> None:

@@ -159,8 +159,8 @@ def assemble(y: Floats, x: Floats) -> Floats:
 
 def _singular(y: Floats) -> str:
     return (
-        f"The control Jacobian is singular at motor angles {y.tolist()} rad: the distal links are parallel or "
-        "in one plane, so the motors do not determine the flange."
+        f"The control Jacobian is singular at motor angles {y.tolist()} rad: the distal links "
+        "are parallel or in one plane, so the motors do not determine the flange."
     )
 
 

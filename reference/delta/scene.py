@@ -127,8 +127,8 @@ def check_start(parameters: Numbers, q0: ArrayLike, v0: ArrayLike) -> None:
     if speed > STANDING:
         near = v - np.linalg.lstsq(H, H @ v, rcond=1e-9)[0]
         raise SceneError(
-            f"The start opens the loops: |h'| = {speed:.3g} m/s. The nearest velocity that keeps them closed is "
-            f"v = {near.tolist()}."
+            f"The start opens the loops: |h'| = {speed:.3g} m/s. The nearest velocity that "
+            f"keeps them closed is v = {near.tolist()}."
         )
 
 

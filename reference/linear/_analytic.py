@@ -50,8 +50,9 @@ def check_analytic(system: System, t: float, q: Floats, v: Floats, u: Floats) ->
             slope = (at(x + WIDTHS[-1] * d)[name] - at(x - WIDTHS[-1] * d)[name]) / (2.0 * WIDTHS[-1])
             kernel = "dynamics" if name in ("M", "f") else "rows"
             raise SceneError(
-                f"Kernel {kernel} gives {entry(name, wrong)} with the derivative {exact[first]:.9g} by a complex step, "
-                f"but {slope[first]:.9g} by differences, along one direction at q = {q.tolist()}. {ADVICE}"
+                f"Kernel {kernel} gives {entry(name, wrong)} with the derivative "
+                f"{exact[first]:.9g} by a complex step, but {slope[first]:.9g} by differences, "
+                f"along one direction at q = {q.tolist()}. {ADVICE}"
             )
 
 

@@ -94,8 +94,8 @@ def independent(at: Point) -> Point:
         sharing.update(among)
         if set(among) & set(at.sliding.tolist()):
             raise SceneError(
-                f"linearise: rows {among} share a load at q = {at.q.tolist()} while some of them slide, and the law "
-                "does not say how (indeterminate): friction, and the motion, depend on it."
+                f"linearise: rows {among} share a load at q = {at.q.tolist()} while some of them slide, "
+                "and the law does not say how (indeterminate): friction, and the motion, depend on it."
             )
     return replace(at, idle=np.array(idle, dtype=np.int64), sharing=np.array(sorted(sharing), dtype=np.int64))
 
@@ -108,8 +108,8 @@ def check_idle(at: Point, H: Floats, vd: Floats, law: Floats, free: Floats) -> N
     off, size = np.abs(H @ vd + law), np.abs(H) @ np.abs(free) + np.abs(law)
     if not off.max(initial=0.0) <= HELD * size.max(initial=0.0):
         raise SceneError(
-            f"linearise: rows {at.idle.tolist()} follow from the other active ones at q = {at.q.tolist()}, but their "
-            "laws do not: no motion fulfils all of them; leave some contacts out."
+            f"linearise: rows {at.idle.tolist()} follow from the other active ones at q = {at.q.tolist()}, "
+            "but their laws do not: no motion fulfils all of them; leave some contacts out."
         )
 
 
@@ -123,8 +123,8 @@ def check_slips(at: Point, H: Floats) -> None:
         slip, size = H[places] @ at.v - drift, np.abs(H[places]) @ np.abs(at.v) + np.abs(drift)
         if not np.linalg.norm(slip) > at.slow * size.max():
             raise NoDirectionError(
-                f"linearise: row {i} slides at no speed at q = {at.q.tolist()}, so that its friction has no direction; "
-                "valid: a state in which it slides, or the contact among those that stick."
+                f"linearise: row {i} slides at no speed at q = {at.q.tolist()}, so that its friction has "
+                "no direction; valid: a state in which it slides, or the contact among those that stick."
             )
 
 
@@ -139,8 +139,8 @@ def check_jam(at: Point, A: Floats, G: Floats) -> None:
     size = np.sqrt(np.diag(G))
     if len(at.sliding) and not np.linalg.det(A / np.outer(size, size)) > JAMMED:
         raise SceneError(
-            f"linearise: the sliding contacts {at.sliding.tolist()} jam at q = {at.q.tolist()} (Painleve): friction "
-            "presses them at least as much as it lets go, and the law determines no acceleration."
+            f"linearise: the sliding contacts {at.sliding.tolist()} jam at q = {at.q.tolist()} (Painleve): "
+            "friction presses them at least as much as it lets go, and the law determines no acceleration."
         )
 
 
@@ -153,7 +153,7 @@ def check_cones(at: Point, lam: Floats) -> None:
         bound = at.system.friction[i] * (1.0 if at.system.dry[i] else lam[at.active.tolist().index(i)])
         if not np.linalg.norm(lam[places]) < (1.0 - CLEAR) * bound:
             raise SceneError(
-                f"linearise: row {i} sticks with a force of {np.linalg.norm(lam[places]):.9g} that friction bounds by "
-                f"{bound:.9g} at q = {at.q.tolist()}: nearby it slides, so that no one model holds; valid: a state "
-                "below the bound, or the contact among those that slide."
+                f"linearise: row {i} sticks with a force of {np.linalg.norm(lam[places]):.9g} that "
+                f"friction bounds by {bound:.9g} at q = {at.q.tolist()}: nearby it slides, so that no "
+                "one model holds; valid: a state below the bound, or the contact among those that slide."
             )

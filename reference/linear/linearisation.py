@@ -124,8 +124,8 @@ def point(
     slid, rubs = different("sliding", sliding, system.nc), np.asarray(system.tangents) > 0
     if not set(slid.tolist()) <= set(rows[rubs[rows]].tolist()):
         raise SceneError(
-            f"linearise.sliding is {list(sliding)}; valid: normal rows with friction of those on, and rows with dry "
-            f"friction, {rows[rubs[rows]].tolist()}."
+            f"linearise.sliding is {list(sliding)}; valid: normal rows with friction of those "
+            f"on, and rows with dry friction, {rows[rubs[rows]].tolist()}."
         )
     if not set(colliding) <= set(rows.tolist()):
         raise SceneError(f"linearise.colliding is {list(colliding)}; valid: rows of those on, {rows.tolist()}.")
