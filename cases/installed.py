@@ -19,9 +19,11 @@ A plug-in is called like its file, and is of every kind whose public names it ha
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
 import sys
 import tomllib
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, partial
 from importlib.util import find_spec
@@ -30,8 +32,7 @@ from types import ModuleType
 from typing import Any, NamedTuple, TypeVar
 
 from crossbody.cases import arguments
-from crossbody.cases.errors import InvalidValue, shown
-from crossbody.cases.own_file import from_file
+from crossbody.cases.errors import CrossbodyError, InvalidValue, SceneError, UnknownName, shown
 
 _Made = TypeVar("_Made")
 
@@ -158,3 +159,43 @@ def shared(function: Callable[..., _Made]) -> Callable[..., _Made]:
 def _knowing(files: Iterable[str], function: Callable[..., _Made], *given: Any) -> _Made:
     use(files)
     return function(*given)
+
+
+def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
+    """Import a file of a user's own.
+
+    Args:
+        kind: what it holds, for example "case", "plugin" or "controller".
+        path: of the file.
+        known: names that would be valid in its place.
+
+    Raises:
+        UnknownName: if it is not there.
+        SceneError: if it cannot be imported, with the line.
+    """
+    spec = importlib.util.spec_from_file_location(f"crossbody_{kind}_{path.stem}", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise UnknownName(f"{kind} file", str(path), known)
+    loaded = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = loaded  # dataclasses look their module up there
+    try:
+        spec.loader.exec_module(loaded)
+    except (CrossbodyError, KeyboardInterrupt):
+        del sys.modules[spec.name]
+        raise
+    except (Exception, SystemExit) as error:
+        del sys.modules[spec.name]
+        raise SceneError(_failed(kind, path, error)) from error
+    return loaded
+
+
+def _failed(kind: str, path: Path, error: BaseException) -> str:
+    """Why a file of a user's own cannot be imported, and the last of its lines that was reached."""
+    if isinstance(error, SyntaxError):
+        file, line, why = error.filename or str(path), error.lineno, error.msg
+    else:
+        own = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path.absolute()]
+        file, line, why = str(path), own[-1].lineno if own else None, str(error)
+    where = file if line is None else f"{file}, line {line}"
+    what = type(error).__name__
+    return f"The {kind} file {path} cannot be imported: {what}{f' ({why[:300]})' if why else ''} in {where}."

@@ -15,7 +15,7 @@ from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.errors import CrossbodyError, InvalidValue, SceneError, UnknownName
 from crossbody.cases.files.case import UNNAMED, case_of, open_file
 from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
-from crossbody.cases.own_file import from_file
+from crossbody.cases.installed import from_file
 from crossbody.cases.scene import Scene
 
 OF_USERS = (".py", *ROBOT_FILES)  # how the paths of files with cases of users' own end

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 from crossbody.cases import Case, CaseUnsupported
-from crossbody.cases.own_file import from_file
+from crossbody.cases.installed import from_file
 from crossbody.reference import System
 
 SYSTEMS = "crossbody.reference.systems"

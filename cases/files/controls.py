@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Inputs
 from crossbody.cases.control import Control
 from crossbody.cases.errors import InvalidValue, UnknownName
-from crossbody.cases.own_file import from_file
+from crossbody.cases.installed import from_file
 from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import Push, Scene
 

@@ -18,10 +18,9 @@ from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
 from crossbody.reports.pages.changes import changes
 from crossbody.reports.pages.html import Page
-from crossbody.reports.pages.known import deviations
 from crossbody.reports.pages.precision import overview
 from crossbody.reports.pages.results import CaseFiles, Results
-from crossbody.reports.pages.summary import engines
+from crossbody.reports.pages.summary import deviations, engines
 from crossbody.reports.runs.store import load
 from crossbody.reports.runs.thin import keep
 

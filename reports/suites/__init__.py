@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
-from crossbody.cases.own_file import from_file
+from crossbody.cases.installed import from_file
 from crossbody.cases.registry import Registry
 from crossbody.reports.suites._own import SUITES
 from crossbody.reports.suites.contract import Suite
