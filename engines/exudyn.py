@@ -218,18 +218,11 @@ class Exudyn(Engine):
         return why_not("Exudyn", case)
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> PeerRun:
-        """Build and assemble the system.
+        """Build and assemble the system; see `Engine.prepare`.
 
-        Args:
-            case: the scene.
-            profile: one of `profiles`.
-            settings: matched: rtol, method; default: dt, s; both: max_steps.
-
-        Raises:
-            UnknownName, CaseUnsupported, InvalidValue: see `crossbody.engines.Engine`.
+        Settings: matched: rtol, method; default: dt, s; both: max_steps.
         """
-        reason = self.why_not(case, profile)
-        if reason is not None:
+        if (reason := self.why_not(case, profile)) is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
         scene = line(case)

@@ -88,18 +88,8 @@ class Pymunk(Engine):
         return "pymunk's plane is x, z, and the bodies slide along y too." if line(case).axis[1] else None
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **given: Any) -> PeerRun:
-        """Build the space.
-
-        Args:
-            case: the scene.
-            profile: one of `profiles`.
-            given: dt, s; restitution; max_steps.
-
-        Raises:
-            UnknownName, CaseUnsupported, InvalidValue: see `crossbody.engines.Engine`.
-        """
-        reason = self.why_not(case, profile)
-        if reason is not None:
+        """Build the space; see `Engine.prepare`. Settings: dt, s; restitution; max_steps."""
+        if (reason := self.why_not(case, profile)) is not None:
             raise CaseUnsupported(reason)
         scene = line(case)
         step = 1e-3 if profile == "matched" else USUAL

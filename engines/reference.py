@@ -173,8 +173,7 @@ class Reference(Engine):
 
     def _chosen(self, case: Case, profile: str, settings: Mapping[str, Any]) -> tuple[str, dict[str, Any], Options]:
         """Return profile, settings by name, and the solver's options."""
-        reason = self.why_not(case, profile)
-        if reason is not None:
+        if (reason := self.why_not(case, profile)) is not None:
             raise CaseUnsupported(reason)
         solver = _settings.profile_of(self.name, self.profiles, profile)
         times = {k: v for k, v in settings.items() if k == "samples" and not (v is None or is_number(v))}

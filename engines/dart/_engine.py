@@ -121,18 +121,8 @@ class Dart(Engine):
         return why_not("DART", case) or no_rigid_contact(case)
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **given: Any) -> Run:
-        """Build the world.
-
-        Args:
-            case: the scene.
-            profile: one of `profiles`.
-            given: dt, s; restitution; max_steps.
-
-        Raises:
-            UnknownName, CaseUnsupported, InvalidValue: see `crossbody.engines.Engine`.
-        """
-        reason = self.why_not(case, profile)
-        if reason is not None:
+        """Build the world; see `Engine.prepare`. Settings: dt, s; restitution; max_steps."""
+        if (reason := self.why_not(case, profile)) is not None:
             raise CaseUnsupported(reason)
         if case.scene is not None and frictional(case.scene):
             return self._stepped(case, profile, given)

@@ -101,19 +101,11 @@ class Drake(Engine):
         return reason
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> Run:
-        """Build the system and its simulator.
+        """Build the system and its simulator; see `Engine.prepare`.
 
-        Args:
-            case: the scene.
-            profile: one of `profiles`.
-            settings: matched: rtol (Drake's accuracy), scheme; continuous: rtol; default: dt, s;
-                all: max_steps.
-
-        Raises:
-            UnknownName, CaseUnsupported, InvalidValue: see `crossbody.engines.Engine`.
+        Settings: matched: rtol (Drake's accuracy), scheme; continuous: rtol; default: dt, s; all: max_steps.
         """
-        reason = self.why_not(case, profile)
-        if reason is not None:
+        if (reason := self.why_not(case, profile)) is not None:
             raise CaseUnsupported(reason)
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
         if case.scene is not None and frictional(case.scene):

@@ -123,22 +123,12 @@ class Mujoco(Engine):
         return f"MuJoCo has no model of the mechanism {name!r}; it has: {', '.join(MECHANISMS.names())}."
 
     def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> Run:
-        """Compile the model of a case.
+        """Compile the model of a case; see `Engine.prepare`.
 
-        Args:
-            case: the scene.
-            profile: one of `profiles`.
-            settings: dt, time step, s; max_steps, bound on their number; reader, of a file as it
-                stands: "file", or "scene" for the model that is built from the scene, with the
-                file's options and softness.
-
-        Raises:
-            UnknownName: for a profile or setting that does not exist.
-            CaseUnsupported: for a mechanism without a model, or a model that MuJoCo refuses, in its words.
-            InvalidValue: for a setting outside its range.
+        Settings: dt, time step, s; max_steps, bound on their number; reader, of a file as it stands: "file",
+        or "scene" for the model that is built from the scene, with the file's options and softness.
         """
-        reason = self.why_not(case, profile)
-        if reason is not None:
+        if (reason := self.why_not(case, profile)) is not None:
             raise CaseUnsupported(reason)
         if (form := form_of(case)) is not None:
             return FormedRun(form=form, inner=self.prepare(form.case, profile, **settings))
@@ -160,15 +150,10 @@ class Mujoco(Engine):
         )  # fmt: skip
 
     def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
-        """The matched profile's derivatives of v' at an equilibrium, by each way that there is.
-
-        Raises:
-            CaseUnsupported: with the sentence of `why_not`.
-        """
+        """The matched profile's derivatives of v' at an equilibrium, by each way that there is."""
         from crossbody.engines.mujoco._linear import linearise
 
-        reason = self.why_not(case, "matched")
-        if reason is not None:
+        if (reason := self.why_not(case, "matched")) is not None:
             raise CaseUnsupported(reason)
         if case.form is not None:
             return linearised(case, spot, self.linearise)

@@ -133,23 +133,13 @@ class Pinocchio(Engine):
         return None
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> Run:
-        """Build the model of a case.
+        """Build the model of a case; see `Engine.prepare`. The profile matched is law.
 
-        Args:
-            case: the scene.
-            profile: one of `profiles`; "matched" is law.
-            settings: law: rtol, method, max_steps and algebra;
-                impulse and impulse_simultaneous: rtol, restitution, max_steps;
-                admm: dt in s, tol in m/s and N s, restitution, max_steps.
-
-        Raises:
-            UnknownName: for a profile or setting that does not exist.
-            CaseUnsupported: with the sentence of `why_not`.
-            InvalidValue: for a setting outside its range.
+        Settings: law: rtol, method, max_steps and algebra; impulse and impulse_simultaneous: rtol,
+        restitution, max_steps; admm: dt in s, tol in m/s and N s, restitution, max_steps.
         """
         profile = _settings.profile_of(self.name, self.profiles, profile)
-        reason = self.why_not(case, profile)
-        if reason is not None:
+        if (reason := self.why_not(case, profile)) is not None:
             raise CaseUnsupported(reason)
         if (form := form_of(case)) is not None:
             return FormedRun(form=form, inner=self.prepare(form.case, profile, **settings))
@@ -171,15 +161,10 @@ class Pinocchio(Engine):
         )  # fmt: skip
 
     def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
-        """The derivatives of v' of the profile law at an equilibrium, by each way that there is.
-
-        Raises:
-            CaseUnsupported: with the sentence of `why_not`.
-        """
+        """The derivatives of v' of the profile law at an equilibrium, by each way that there is."""
         from crossbody.engines.pinocchio._linear import linearise
 
-        reason = self.why_not(case, "law")
-        if reason is not None:
+        if (reason := self.why_not(case, "law")) is not None:
             raise CaseUnsupported(reason)
         if case.form is not None:
             return linearised(case, spot, self.linearise)
