@@ -116,8 +116,7 @@ def _either(wanted: str, checks: Iterable[Check], where: str, value: object) -> 
 
 def _check_of_class(name: str, space: Mapping[str, Any]) -> Check | None:
     """Return what checks that a value is of a class; None for what is none, a protocol or an alias."""
-    found = space.get(name)
-    if found is None:
+    if (found := space.get(name)) is None:
         return functools.partial(_of_name, name)
     if not isinstance(found, type) or found is Any or getattr(found, "_is_protocol", False):
         return None
@@ -131,8 +130,7 @@ def _full_name(of: type) -> str:
 
 
 def _of_name(name: str, where: str, value: object) -> object:
-    found = next((of for of in type(value).__mro__ if of.__name__ == name), None)
-    if found is None:
+    if all(of.__name__ != name for of in type(value).__mro__):
         raise InvalidValue(f"{where} is {shown(value)}; it must be a {name}.")
     return value
 

@@ -28,8 +28,7 @@ def form_of(case: Case, powered: bool = True, steady: bool = False) -> Form | No
     """
     if case.form is None:
         return None
-    check = getattr(module(case.mechanism), "check_start", None)
-    if check is not None:
+    if (check := getattr(module(case.mechanism), "check_start", None)) is not None:
         check(case.parameters, case.q0, case.v0)
     return case.form(case, powered, steady)
 

@@ -134,8 +134,7 @@ def _first(there: NDArray[np.bool_]) -> int:
 
 def why_no_line(case: Case) -> str | None:
     """Return why a case is not of bodies on one line, in words that go on from "It"; None if it is."""
-    scene = case.scene
-    if scene is None:
+    if (scene := case.scene) is None:
         return f"has no scene as data, but the mechanism {case.mechanism!r}."
     if scene.actuators or scene.pushes or scene.pairs or any(loop.in_space for loop in scene.loops):
         return "has loops in space, actuators, pushes or pairs of shapes."

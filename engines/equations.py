@@ -53,8 +53,7 @@ def system_of(case: Case, traced: bool | None = None) -> System:
     Raises:
         CaseUnsupported: if the reference has no equations of it.
     """
-    build = builder(case.mechanism)
-    if build is not None:
+    if (build := builder(case.mechanism)) is not None:
         return build(case.parameters, case.law)
     if case.scene is None:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")

@@ -156,8 +156,7 @@ class Reference(Engine):
         """
         solver, used, options = self._chosen(case, profile, settings)
         system = system_of(case, TRACED[str(used.get("traced", KEPT))])
-        check = getattr(module(case.mechanism), "check_start", None)
-        if check is not None:
+        if (check := getattr(module(case.mechanism), "check_start", None)) is not None:
             check(case.parameters, case.q0, case.v0)
         try:
             inner = prepare(system, case.q0, case.v0, options)

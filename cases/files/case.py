@@ -194,8 +194,7 @@ def case_of(
         raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
     names, laws, _ = rows_of(scene)
-    fast = [name for name, one in zip(names, laws, strict=True) if one.b0 or one.b1]
-    if fast:
+    if fast := [name for name, one in zip(names, laws, strict=True) if one.b0 or one.b1]:
         raise SceneError(
             f"Row {fast[0]!r} has constants of COLLISION, which no row of a scene follows: b0, b1 must be 0."
         )

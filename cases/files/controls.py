@@ -136,8 +136,7 @@ def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Input
     Raises:
         InvalidValue: naming what is wrong with a push.
     """
-    given = [_push(part, scene) for part in text.split(";") if part.strip()]
-    if not given:
+    if not (given := [_push(part, scene) for part in text.split(";") if part.strip()]):
         return scene, inputs
     scene = scene.replace(pushes=[Push(name=f"push {i}", body=body) for i, (body, _, _) in enumerate(given)])
     own = [] if inputs is None else inputs.times.tolist()

@@ -105,8 +105,7 @@ def _explicit(model: Any, i: int, name: Callable[[int], str], law: Callable[[Any
 
 def _mixed(model: Any, a: int, b: int, name: Callable[[int], str], law: Callable[[Any, Any, Any], RowLaw]) -> Pair:
     """Return two shapes with what the one of higher priority says, or both: the larger friction, a mean of the rest."""
-    order = int(model.geom_priority[a]) - int(model.geom_priority[b])
-    if order:
+    if order := int(model.geom_priority[a]) - int(model.geom_priority[b]):
         ruling = a if order > 0 else b
         friction, dimension = model.geom_friction[ruling], int(model.geom_condim[ruling])
     else:
@@ -126,8 +125,7 @@ def _mixed(model: Any, a: int, b: int, name: Callable[[int], str], law: Callable
 
 def _softness(model: Any, a: int, b: int) -> tuple[Any, Any]:
     """Return solref and solimp of two shapes: of the one of higher priority, else a mean (the lesser, if direct)."""
-    order = int(model.geom_priority[a]) - int(model.geom_priority[b])
-    if order:
+    if order := int(model.geom_priority[a]) - int(model.geom_priority[b]):
         ruling = a if order > 0 else b
         return model.geom_solref[ruling], model.geom_solimp[ruling]
     share, one, two = _share(model, a, b), model.geom_solref[a], model.geom_solref[b]

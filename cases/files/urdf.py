@@ -204,8 +204,7 @@ def bounds(path: Path) -> dict[str, dict[str, float]]:
 
 def inertial(link: ElementTree.Element) -> tuple[float, Floats, Floats]:
     """Return mass, centre (3,) and inertia about it (3, 3), in the link's axes."""
-    own = link.find("inertial")
-    if own is None:
+    if (own := link.find("inertial")) is None:
         return 0.0, np.zeros(3), np.zeros((3, 3))
     name = link.get("name")
     mass = _number(name, own.find("mass"), "value")

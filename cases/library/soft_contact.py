@@ -42,8 +42,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     p = soft.numbers(parameters)
     soft.check(p)
     _check_names(variant, parameters)
-    whole = variant == "delta"
-    if whole:
+    if whole := variant == "delta":
         robot.check(p)
     q0 = robot.start(p) if whole else soft.start(p)
     claimed = claims(variant, parameters, PARAMETERS, VARIANTS[variant])

@@ -163,8 +163,7 @@ class SceneRun(Run):
 
     def __post_init__(self) -> None:
         """Build the plant and what acts on it."""
-        scene = self.case.scene
-        if scene is None:
+        if (scene := self.case.scene) is None:
             raise CaseUnsupported(f"{self.case.label} is not a scene.")
         dt = float(self.settings.get("dt", 0.0))
         forces = Forces(scene)

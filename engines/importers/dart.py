@@ -36,8 +36,7 @@ class _Robot:
             gravity = np.array([0.0, 0.0, -9.81])  # a URDF has none; DART's World has it along z too, a Skeleton not
             self._s = [found] if found is not None else []
         else:
-            world = dartpy.utils.MjcfParser.readWorld(path)
-            if world is None:
+            if (world := dartpy.utils.MjcfParser.readWorld(path)) is None:
                 raise ValueError("DART's reader returns nothing")
             self._s = [world.getSkeleton(i) for i in range(world.getNumSkeletons())]
             gravity = world.getGravity()

@@ -100,8 +100,7 @@ class _Robot:
         """Find the actuators that it keeps for its MuJoCo solver, if all of them act on joints."""
         own = getattr(self._m, "mujoco", None)
         self._driven: list[tuple[str, int, Any, Any]] = []
-        labels = list(getattr(own, "actuator_label", []))
-        if not labels:
+        if not (labels := list(getattr(own, "actuator_label", []))):
             return
         kept = [getattr(own, f"actuator_{key}").numpy() for key in ("trntype", "trnid", "gear", "gainprm", "biasprm")]
         moved = {joint[4]: joint for joint in self.joints}

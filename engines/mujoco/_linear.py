@@ -82,8 +82,7 @@ def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, .
 
 def _stand(mechanism: ModuleType, dt: float, case: Case, spot: Spot) -> Stand:
     """Return the matched scene of a mechanism at an equilibrium."""
-    build = getattr(mechanism, "build", None)
-    if build is None:
+    if (build := getattr(mechanism, "build", None)) is None:
         raise CaseUnsupported(f"MuJoCo's model of {case.mechanism!r} has other coordinates, without a chart here.")
     scene = build(case, "matched", dt)
     for softness in (scene.model.dof_invweight0, scene.model.tendon_invweight0):

@@ -63,8 +63,7 @@ class Locator:
         any may be the one that bears. A change of constants alone (COLLISION to CONTACT) crosses
         nothing: it is taken at the end of the step.
         """
-        crossed = self._crossed(modes)
-        if not crossed:
+        if not (crossed := self._crossed(modes)):
             return 0
         full, trials = self.model.opt.timestep, 0
 

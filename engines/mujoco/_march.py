@@ -147,8 +147,7 @@ class March:
 
     def _broken(self) -> bool:
         data = self.scene.data
-        finite = all(bool(np.isfinite(x).all()) for x in (data.qpos, data.qvel, data.qacc))
-        if finite:
+        if finite := all(bool(np.isfinite(x).all()) for x in (data.qpos, data.qvel, data.qacc)):
             self.tape.record(self.scene.lam(), self.now)
         return self._end(Outcome.DIVERGED if finite else Outcome.NOT_FINITE, "the state left what the scene can reach")
 

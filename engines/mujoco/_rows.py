@@ -136,8 +136,7 @@ class Rows:
         if self.nc == 1:
             return self.only
         there = data.efc_type[first:last].tobytes(), data.efc_id[first:last].tobytes(), data.contact.geom.tobytes()
-        known = self._known.get(there)
-        if known is None:
+        if (known := self._known.get(there)) is None:
             known = self._known[there] = tuple(self._present(first, last))
         return known
 

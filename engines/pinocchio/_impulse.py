@@ -118,8 +118,7 @@ Impact = Callable[[Instant, list[float], list[float]], bool]
 def sequential(at: Instant, a0: list[float], e: list[float]) -> bool:
     """Strike the free touching row that approaches most (ties within 1e-12 by index); held rows stay if they push."""
     hd = at.rates()
-    coming = [i for i in at.touching if at.modes[i] == FREE and hd[i] < 0.0]
-    if not coming:
+    if not (coming := [i for i in at.touching if at.modes[i] == FREE and hd[i] < 0.0]):
         return False
     fastest = min(hd[i] for i in coming)
     i = next(j for j in coming if hd[j] <= fastest * (1.0 - TIES))
@@ -142,8 +141,7 @@ def sequential(at: Instant, a0: list[float], e: list[float]) -> bool:
 def simultaneous(at: Instant, a0: list[float], e: list[float]) -> bool:
     """Strike all touching rows at once: 0 <= p perp H v+ + e H v >= 0."""
     hd, press = at.rates(), at.press()[0]
-    coming = [i for i in at.touching if at.modes[i] == FREE and hd[i] < 0.0]
-    if not coming:
+    if not (coming := [i for i in at.touching if at.modes[i] == FREE and hd[i] < 0.0]):
         return False
     caught = {i for i in coming if e[i] <= 0.0 or -hd[i] < capture_speed(float(press[i]), a0[i], e[i])}
     bounce = [0.0 if i in caught or at.modes[i] != FREE else e[i] for i in range(at.rows.nc)]

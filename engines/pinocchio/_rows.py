@@ -198,8 +198,7 @@ class PinRows:
 
     def _chosen(self, modes: Modes) -> Any:
         """The index of the active rows and the constants of their modes; made once for every set of modes."""
-        found = self._sets.get(modes)
-        if found is None:
+        if (found := self._sets.get(modes)) is None:
             on = list(active(modes))
             rows = None if not on else slice(None) if len(on) == self.nc else on
             law = np.where([m == Mode.COLLISION for m in modes], self.entered, self.slow)

@@ -53,8 +53,7 @@ class Ways:
         wanted = [k for k, rows in zip(self.turning, self.rows, strict=True) if any(modes[i] for i in rows)]
         for k in [k for k in along if k not in wanted]:
             del along[k]
-        new = [k for k in wanted if k not in along]
-        if new:
+        if new := [k for k in wanted if k not in along]:
             parted, sides = self._parted(q, new)
             along.update({k: parted[k] <= 0.0 for k in new})
             self.sides.update({k: sides[k] for k in new})
@@ -65,8 +64,7 @@ class Ways:
     def watch(self, q: Floats, out: Floats) -> None:
         """Fill out (watched,) with what is positive until a pair that is held lies the other way."""
         out[:] = 1.0
-        along = self.touching.along
-        if not along:
+        if not (along := self.touching.along):
             return
         parted, sides = self._parted(q, list(along))
         for i, k in enumerate(self.turning):

@@ -105,8 +105,7 @@ class Bodies:
 
 def build(case: Case, algebra: str) -> Prepared:
     """Return the model of a scene with its forces and rows."""
-    scene = case.scene
-    if scene is None:
+    if (scene := case.scene) is None:
         raise CaseUnsupported(f"{case.label} is not a scene.")
     law = (real_time(case, two_sets=True) or case).law
     gated = None if case.gates is None else Gated(case.gates, len(case.contacts), scene.nv)

@@ -77,8 +77,7 @@ def identify(
     logs = [log] if isinstance(log, Log) else log
     cut = [window for one in logs for window in windows(one, chosen, restart, delay, horizon)]
     held = [i for i in range(len(cut)) if hold and i % hold == hold - 1]
-    fitted = [i for i in range(len(cut)) if i not in held]
-    if not fitted:
+    if not (fitted := [i for i in range(len(cut)) if i not in held]):
         raise SceneError("No window is left to fit; hold fewer out, or restart more often.")
     kind: Any = Exact if chosen.places and not engine else Differences
     more = (engine,) if kind is Differences else ()
@@ -118,8 +117,7 @@ def _check(model: Model, free: Sequence[str], starts: str, hold: int, stride: in
     model.numbers({name: model.parameters[name].default for name in free if name in model.parameters})
     if not free or len(set(free)) < len(free):
         raise InvalidValue("Name at least one free parameter, and none twice.")
-    unknown = [name for name in free if name != DELAY and name not in model.parameters]
-    if unknown:
+    if unknown := [name for name in free if name != DELAY and name not in model.parameters]:
         model.numbers(dict.fromkeys(unknown, 0.0))
     if starts not in ("auto", "measured", "free") or hold < 0 or hold == 1 or stride < 1:
         raise InvalidValue("starts is auto, measured or free, hold is 0 or at least 2, stride at least 1.")

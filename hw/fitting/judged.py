@@ -239,8 +239,7 @@ def _warnings(
     if fit.worse > 0.0:
         before, after = fit.before["rmse"][1], fit.after["rmse"][1]
         yield f"On windows that were not fitted the rmse grew from {before:.4g} to {after:.4g}: worse than the start."
-    few = [e.name for e in fit.estimates if np.isfinite(e.std) and e.freedom < EFFECTIVE]
-    if few:
+    if few := [e.name for e in fit.estimates if np.isfinite(e.std) and e.freedom < EFFECTIVE]:
         yield f"The intervals of {', '.join(few)} rest on few independent pieces of data: more windows would tell."
     if off > tolerance:
         yield f"Derivatives differ from central differences by {off:.1e}: judge the intervals by it."

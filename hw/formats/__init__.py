@@ -91,8 +91,7 @@ def recognise(path: Path) -> str:
         raise LogFormatError(path, f"could be {' or '.join(found)}; say which by `format` in the column map.")
     if path.is_dir():
         raise LogFormatError(path, "is a folder; name a file, or the folder of a ROS 2 bag (with its metadata.yaml).")
-    promised = [name for name in names() if path.suffix.lower() in load(name).SUFFIXES]
-    if promised:
+    if promised := [name for name in names() if path.suffix.lower() in load(name).SUFFIXES]:
         raise LogFormatError(path, f"does not begin as {' or '.join(promised)} files do: damaged, or not what it says.")
     known = ", ".join(f"{name} ({' '.join(load(name).SUFFIXES)})" for name in names())
     raise LogFormatError(path, f"is in no known log format (it begins with {head[:8].hex(' ')}). Known: {known}.")

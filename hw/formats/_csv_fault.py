@@ -53,8 +53,7 @@ def find_fault(
                 if line.strip():
                     cells = next(csv.reader([line], delimiter=delimiter))
                     names = names or [f"c{i}" for i in range(len(cells))]
-                    found = _check(path, row, names, cells, columns, options.decimal)
-                    if found:
+                    if found := _check(path, row, names, cells, columns, options.decimal):
                         return found
                     row += 1
     except (OSError, UnicodeError, csv.Error) as error:

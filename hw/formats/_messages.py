@@ -74,8 +74,7 @@ def crowded(message: Any) -> str:
     left, count = [message], 0
     while left:
         value = left.pop()
-        members = _members(value)
-        if members is not None:
+        if (members := _members(value)) is not None:
             count += 1
             left.extend(members.values())
         elif (
@@ -95,8 +94,7 @@ def refuse_large(path: Path, topic: str, data: bytes) -> None:
     Raises:
         LogFormatError: if it is too large.
     """
-    why = too_large(data)
-    if why:
+    if why := too_large(data):
         raise LogFormatError(path, f"{topic!r} {why}.")
 
 

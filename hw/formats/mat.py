@@ -61,8 +61,7 @@ class MatReader:
             self._add(name, name, shape, np.dtype({"double": "f8", "single": "f4", "logical": "u1"}.get(kind, kind)))
 
     def _add(self, key: str, name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
-        found = layout(shape)
-        if found is None:
+        if (found := layout(shape)) is None:
             self.refused[name] = f"has shape {tuple(shape)}, which is no table"
             return
         rows, width, axis = found

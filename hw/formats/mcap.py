@@ -81,8 +81,7 @@ class McapReader:
                 self.refused[topic] = why or kind
                 continue
             message = decode(data)
-            why = crowded(message)
-            if why:
+            if why := crowded(message):
                 self.refused[topic] = why
                 continue
             group, self._leaves[topic] = topic_group(topic, count, message, CLOCKS)

@@ -50,8 +50,7 @@ class ParquetReader:
             batches = self._file.iter_batches(BLOCK_ROWS, columns=list(columns), use_threads=False)
         while True:
             with parsing(self._path, "Parquet file", row), plain_allocator(self._path):
-                batch = next(batches, None)
-                if batch is None:
+                if (batch := next(batches, None)) is None:
                     return
                 block = {name: _numbers(batch.column(name)) for name in columns}
             yield block

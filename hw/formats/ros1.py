@@ -82,8 +82,7 @@ class RosbagReader:
             except KeyError as error:
                 self.refused[topic] = f"has messages of a type that the bag does not define ({words(error)})"
                 continue
-            why = crowded(message)
-            if why:
+            if why := crowded(message):
                 self.refused[topic] = why
                 continue
             group, self._leaves[topic] = topic_group(topic, about.msgcount, message, CLOCKS)

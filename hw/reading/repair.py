@@ -29,8 +29,7 @@ def check_names(asked: Collection[str]) -> None:
 def drop_duplicates(block: Rows) -> tuple[Rows, tuple[Repair, ...]]:
     """Keep the first of rows with the same time."""
     again = np.diff(block.time, prepend=np.nan) == 0.0
-    count = int(np.count_nonzero(again))
-    if not count:
+    if not (count := int(np.count_nonzero(again))):
         return block, ()
     i = int(np.argmax(again))
     told = Repair(name="drop_duplicates", rows=count, row=int(block.rows[i]), t=float(block.time[i]))

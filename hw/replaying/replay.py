@@ -120,8 +120,7 @@ def _looped(model: Model, numbers: Mapping[str, Value], window: Window, name: st
     if name != "reference":
         raise CaseUnsupported(f"{name} follows the paths of a case alone; a recorded reference is the reference's.")
     assert model.loop is not None  # checked by the caller
-    lacking = [r for r in model.references if r not in window.log.names("references")]
-    if lacking:
+    if lacking := [r for r in model.references if r not in window.log.names("references")]:
         raise SceneError(f"The log has no reference {', '.join(lacking)}, which the controller follows.")
     return model.loop(numbers, window.segment, window.log), {"profile": "compiled"}
 

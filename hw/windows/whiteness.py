@@ -90,8 +90,7 @@ def crosscorrelation(
     """
     left, inputs = ([averaged(piece, stride) for piece in _pieces(x)] for x in (residual, u))
     taps = _whitener(inputs)
-    pairs = [(r, x) for r, x in zip(left, inputs, strict=True) if len(r) > len(taps)]
-    if not pairs:
+    if not (pairs := [(r, x) for r, x in zip(left, inputs, strict=True) if len(r) > len(taps)]):
         return Correlation(lags=np.zeros(1, np.int64), values=np.zeros(1), band=1.0, stride=stride, floor=floor)
     a, b = ([np.convolve(x, taps, "valid") for x in side] for side in zip(*pairs, strict=True))
     found = _correlation(a, b, min(most, max(map(len, a)) - 1))

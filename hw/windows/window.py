@@ -95,8 +95,7 @@ def recorded_inputs(log: Log, model: Model) -> Floats:
     Raises:
         SceneError: naming those that the log does not have.
     """
-    lacking = [name for name in model.inputs if name not in log.names("inputs")]
-    if lacking:
+    if lacking := [name for name in model.inputs if name not in log.names("inputs")]:
         raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
     return np.array([_in_force(log, name) for name in model.inputs]).reshape(len(model.inputs), len(log)).T
 
@@ -115,8 +114,7 @@ def _cuts(t: Floats, restart: float, length: float) -> list[tuple[int, int]]:
         return [(0, len(t) - 1)]
     starts = t[0] + restart * np.arange(max(0, int((t[-1] - t[0] - length) / restart + 1e-9) + 1))
     edges = np.searchsorted(t, np.stack([starts, starts + length]) - 1e-9 * length)
-    found = [(int(a), int(b)) for a, b in edges.T if b - a >= FEWEST and b < len(t)]
-    if not found:
+    if not (found := [(int(a), int(b)) for a, b in edges.T if b - a >= FEWEST and b < len(t)]):
         raise SceneError(
             f"The log spans {t[-1] - t[0]:g} s with {len(t)} samples: no window of {length:g} s with {FEWEST} of them."
         )

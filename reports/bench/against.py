@@ -35,8 +35,7 @@ def read(base: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     found = []
     for name, wanted in NEEDED.items():
         rows = _table(base / f"{name}.parquet")
-        missing = [column for column in wanted if column not in rows.columns]
-        if missing:
+        if missing := [column for column in wanted if column not in rows.columns]:
             raise OutputError(
                 f"--against {base}: {name} has no column {', '.join(missing)}; it is of another version, "
                 "run crossbody bench again for a base."

@@ -40,8 +40,7 @@ class Truths:
 
     def of(self, run: Any) -> tuple[str, Truth]:
         """In words whose truth, and the truth."""
-        followed = self._followed(run)
-        if followed is None:
+        if (followed := self._followed(run)) is None:
             return "the case", self.own
         name = f"{followed.fsm}, {followed.collisions}"
         if name not in self.known:

@@ -56,8 +56,7 @@ class Ladder:
         plain = engines.load(self.pick.engine).prepare(self.case, self.pick.profile)
         # Nobody asked for the account, and what is compiled for a model is compiled before it is timed.
         lean = {name: value for name, value in (("ledger", False), ("traced", "yes")) if name in plain.settings}
-        knob = next((name for name in LADDERS if name in plain.settings), "")
-        if not knob:
+        if not (knob := next((name for name in LADDERS if name in plain.settings), "")):
             yield "", math.nan, plain
         met: set[float] = set()
         for setting in LADDERS.get(knob, ())[:: self.effort.every]:

@@ -41,8 +41,7 @@ def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, co
         CrossbodyError: for wrong use.
     """
     wanted = importers.known(engines)
-    features = [feature for feature in FEATURES if part in feature.name]
-    if not features:
+    if not (features := [feature for feature in FEATURES if part in feature.name]):
         raise UnknownName("feature", part, tuple(feature.name for feature in FEATURES))
     output.check(out, STUDY)
     rows, absent = [], dict[str, str]()
@@ -54,8 +53,7 @@ def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, co
             else:
                 told = {"feature": feature.name, "format": feature.format, "rule": feature.rule}
                 rows.append(told | asdict(row) | {"rewrite": feature.rewrite, "text": feature.text})
-    rows = [row for row in rows if row["engine"] not in absent]
-    if not rows:
+    if not (rows := [row for row in rows if row["engine"] not in absent]):
         raise EngineUnavailable(f"None of these is installed: {', '.join(wanted)}.")
     found, told_by = pd.DataFrame(rows), provenance(command)
     with output.folder(out, STUDY) as made:

@@ -116,8 +116,7 @@ def _client(address: str | None, tls: pools.Tls) -> Iterator[Any]:
 def sweep(store: Store, specs: Sequence[Spec], chunk: int, pool: Pool) -> None:
     """Execute what is missing; every chunk is on disk as soon as it is there."""
     parts = [specs[i : i + chunk] for i in range(0, len(specs), chunk)]
-    left = [(i, parts[i]) for i in store.missing(len(parts))]
-    if not left:
+    if not (left := [(i, parts[i]) for i in store.missing(len(parts))]):
         return
     with voice.progress(len(parts), done=len(parts) - len(left)) as tell:
         for number, rows in _executed(left, pool):

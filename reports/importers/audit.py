@@ -169,8 +169,7 @@ def with_closed_forms(scene: Scene, own: Mapping[str, Inertia | None]) -> Scene:
     """Return the scene with inertias of shapes as we compute them: what the compiler makes of them shows."""
 
     def of(body: Body) -> Body:
-        inertia = own.get(body.name)
-        if inertia is None:
+        if (inertia := own.get(body.name)) is None:
             return body
         return replace(body, mass=inertia.mass, com=tuple(inertia.com.tolist()), inertia=six(inertia.about))
 

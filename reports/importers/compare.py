@@ -158,8 +158,7 @@ def _row(
         verdict = FAILED if quantity in found.get("refused", ()) else UNSEEN
         return Row(**common, verdict=verdict, why=unseen[quantity])
     told = sorted(own, key=lambda gap: -gap.size)
-    off = [gap for gap in told if not gap.size <= tolerance]
-    if not off:
+    if not (off := [gap for gap in told if not gap.size <= tolerance]):
         return Row(**common, **_numbers(told[0])) if told else Row(**common)
     words = WORDS.get(quantity, "")
     why = [_hidden(hidden, quantity, gap) or said.excuse(words, bodies.get(gap.part, {gap.part} - {""})) for gap in off]

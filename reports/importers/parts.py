@@ -44,8 +44,7 @@ def tendons(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | 
         return None
     told = [Gap(1.0, f"{name} is more", part=name, lacks=False) for name in found["tendons"].keys() - wanted["tendons"]]
     for name, theirs in wanted["tendons"].items():
-        mine = found["tendons"].get(name)
-        if mine is None:
+        if (mine := found["tendons"].get(name)) is None:
             told.append(Gap(1.0, f"{name} is missing", part=name))
             continue
         pairs = list(zip(theirs, mine, strict=True))
@@ -65,8 +64,7 @@ def loops(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | No
     blind = [i for i in left if not mine[i][0]]
     for k, (kind, of, _) in enumerate(theirs):
         named = f"{kind} {' and '.join(of)}".strip() if of else f"{kind} {k}"
-        same = {i: _held_apart(found, i, wanted, k) for i in left if mine[i][0] == kind}
-        if same:
+        if same := {i: _held_apart(found, i, wanted, k) for i in left if mine[i][0] == kind}:
             i = min(same, key=lambda one: same[one])
             left.remove(i)
             told.append(Gap(same[i], f"what {named} holds" if same[i] else named, part=of[0] if of else ""))

@@ -195,8 +195,7 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     if truth.part < 1.0:
         asked = case.t_end / truth.part
         told.append(f"Followed to {case.t_end:.4g} s of {asked:.4g} s: {truth.short}.")
-    lost = shortened(truth).trusted < compared_until(case) - SAME_END * case.t_end
-    if lost:
+    if lost := shortened(truth).trusted < compared_until(case) - SAME_END * case.t_end:
         told.append(f"The stored runs were compared up to {compared_until(case):.4g} s.")
     return [Verdict(
         case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",

@@ -139,8 +139,7 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
         grows=float(grown[-1]), joined=case.general,
     )  # fmt: skip
     truth = _held_against(truth, second, case, loose)
-    horizon = _horizon(case, truth, second, t, grown)
-    if horizon is not None:
+    if (horizon := _horizon(case, truth, second, t, grown)) is not None:
         known = replace(truth, horizon=horizon, grows=float(np.interp(horizon.until, t, grown)))
         truth = _held_against(known, second, replace(case, chaos=horizon), loose)
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())

@@ -156,8 +156,7 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
         return Word.WITHIN, (said + why).strip()
     if limit is None or not limit.known:
         return Word.OUTSIDE, (said + why).strip()
-    sizes = explained(limit, stored)
-    if sizes is None:
+    if (sizes := explained(limit, stored)) is None:
         return Word.INFO, f"Known, but its size has not been measured here: {limit.known}"
     least, most = sizes
     if least <= off <= most:

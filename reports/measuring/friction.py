@@ -81,8 +81,7 @@ def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats,
 
 def off_slip(run: Trajectory, case: Case) -> float:
     """Return how far friction is at most from -mu lam_n s, s along the slip, N; 0 where nothing slides."""
-    found = rubbing(run, case)
-    if found is None:
+    if (found := rubbing(run, case)) is None:
         return 0.0
     slides, speed, _ = sliding(run, found)
     bound = (found.mu * found.normal)[slides][:, None]

@@ -90,8 +90,7 @@ def shortened(truth: Truth) -> Truth:
     end = truth.trusted
     if not end < truth.trajectory.t[-1]:
         return truth
-    near = [e.t for e in truth.trajectory.events if LAST * end < e.t < end / LAST]
-    if near:
+    if near := [e.t for e in truth.trajectory.events if LAST * end < e.t < end / LAST]:
         edges = [LAST * end, *(t for t in near if t < end), end]
         end = max((b - a, 0.5 * (a + b)) for a, b in pairwise(edges))[1]
     return replace(truth, trajectory=before(truth.trajectory, end), trusted=end)

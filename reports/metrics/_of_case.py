@@ -41,8 +41,7 @@ class OfCase:
         if own.number is not None:
             return own.number(run, case)
         if own.signal is not None:
-            values = own.signal(run, case)
-            if values is None:
+            if (values := own.signal(run, case)) is None:
                 return None
             inside, exact = aligned(truth, run, releases=self.jumps)
             theirs = own.signal(exact, case)

@@ -19,8 +19,7 @@ ALWAYS = True
 
 def cone_violation(run: Trajectory, case: Case) -> float | None:
     """How far friction exceeds mu times the normal force, over the largest bound."""
-    found = rubbing(run, case)
-    if found is None:
+    if (found := rubbing(run, case)) is None:
         return None
     bound = found.mu * found.normal
     most = float(np.max(bound, initial=0.0))
@@ -29,8 +28,7 @@ def cone_violation(run: Trajectory, case: Case) -> float | None:
 
 def creep_speed(run: Trajectory, case: Case) -> float | None:
     """Largest slip at the end of contacts that hold: nought where friction holds, whatever the bound on its force."""
-    found = rubbing(run, case)
-    if found is None:
+    if (found := rubbing(run, case)) is None:
         return None
     held = run.mode[-1, found.rows] == Mode.STICK
     return float(np.linalg.norm(found.slip[-1, held], axis=-1).max()) if held.any() else None
@@ -38,8 +36,7 @@ def creep_speed(run: Trajectory, case: Case) -> float | None:
 
 def friction_angle(run: Trajectory, case: Case) -> float | None:
     """Largest angle between friction and what is against the slip, where a contact slides."""
-    found = rubbing(run, case)
-    if found is None:
+    if (found := rubbing(run, case)) is None:
         return None
     slides, speed, force = sliding(run, found)
     if not slides.any():
@@ -56,8 +53,7 @@ def friction_impulse(run: Trajectory, case: Case) -> Floats | None:
 
 def friction_power(run: Trajectory, case: Case) -> float | None:
     """Largest power that friction of a pair of shapes gives: nought where it is against the slip."""
-    found = rubbing(run, case)
-    if found is None:
+    if (found := rubbing(run, case)) is None:
         return None
     return float(np.max(found.of_pairs(np.sum(found.force * found.slip, axis=-1)), initial=0.0))
 

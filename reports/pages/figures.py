@@ -112,8 +112,7 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
                 continue
             sheet.line(trace, i, 3 * place, trace.run.lam[:, k])
             sheet.line(trace, i, 3 * place + 1, summed[i][:, k])
-            exact = true[i]
-            if exact is not None:
+            if (exact := true[i]) is not None:
                 sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor))
         ends, far = robust(traces, k)
         if ends is not None:

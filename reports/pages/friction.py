@@ -28,8 +28,7 @@ TEXT = (
 
 def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     """The section, with a share of the usual points; nothing where no contact with friction is pressed."""
-    found = _pressed(traces)
-    if found is None:
+    if (found := _pressed(traces)) is None:
         return []
     contact, place = found
     name, most = contact.normals[place], max(int(share * MOST), 2)

@@ -25,8 +25,7 @@ def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
 
     Nothing where no contact that opens and closes carries anything.
     """
-    k = _busiest(traces)
-    if k is None:
+    if (k := _busiest(traces)) is None:
         return []
     lines = [line for i, trace in enumerate(traces) if (line := _line(trace, i, k, int(share * MOST)))]
     name = traces[0].about["contacts"][k]

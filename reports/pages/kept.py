@@ -23,8 +23,7 @@ class KeptTemplates(BytecodeCache):
 
     def dump_bytecode(self, bucket: Bucket) -> None:
         """Keep a template."""
-        store = code_store.current()
-        if store is not None:
+        if (store := code_store.current()) is not None:
             store.write(_name(bucket), bucket.bytecode_to_string())
 
 

@@ -38,8 +38,7 @@ def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: M
         rows: verdicts of the case.
         walls: run time of each engine, s.
     """
-    ladders = _ladders(out, label)
-    if ladders:
+    if ladders := _ladders(out, label):
         import pandas as pd
 
         from crossbody.reports.bench.figure import work_precision

@@ -161,8 +161,7 @@ def times_of(out: Path) -> Times:
 
 
 def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:
-    lost = [who for who in ["truth:", *engines] if (label, who) not in times]
-    if not lost:
+    if not (lost := [who for who in ["truth:", *engines] if (label, who) not in times]):
         return ()
     names = ", ".join(who.removesuffix(":") for who in lost)
     unreadable = f" (not readable: {', '.join(broken)})" if broken else ""

@@ -188,8 +188,7 @@ def _begun(task: Callable[[], int]) -> int:
     """Begin a task in a process that an interrupt of the terminal reaches through its parent alone."""
     sys.stdout.flush()
     sys.stderr.flush()
-    process = os.fork()
-    if process:
+    if process := os.fork():
         return process
     code = 0
     try:

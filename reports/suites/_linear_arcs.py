@@ -151,8 +151,7 @@ class LinearArcs:
             now = self._conditions(modes)
             noise = NOISE * (np.abs(now.functionals) @ np.abs(x))
             clear = now.functionals @ x < -noise
-            fired = [k for k, parts in enumerate(now.parts) if clear[parts].all()]
-            if not fired:
+            if not (fired := [k for k, parts in enumerate(now.parts) if clear[parts].all()]):
                 return True
             for k in fired:
                 self._switch(t, x, modes, (now.rows[k], now.after[k]), events)
@@ -212,8 +211,7 @@ class LinearArcs:
         q, v = x[:, : self.n], x[:, self.n : -1]
         lam = np.zeros((len(times), len(self.H)))
         for j, k in enumerate(piece):
-            active = [i for i, mode in enumerate(arcs[k].modes) if mode == Mode.CONTACT]
-            if active:
+            if active := [i for i, mode in enumerate(arcs[k].modes) if mode == Mode.CONTACT]:
                 lam[j, active] = self._multipliers(active) @ x[j]
         energy = [
             0.5 * np.einsum("ti,ij,tj->t", v, self.M, v),

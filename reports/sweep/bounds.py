@@ -105,6 +105,5 @@ def overheard(heard: list[str]) -> Iterator[None]:
                 os.dup2(kept, target)
                 os.close(kept)
             file.seek(0)
-            text = file.read(2000).decode(errors="replace").strip()
-            if text:
+            if text := file.read(2000).decode(errors="replace").strip():
                 heard.append(text)

@@ -108,8 +108,7 @@ def _exact(case: Case, times: Floats) -> Truth | str:
 def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Truth | str:
     """The same equations by SUNDIALS."""
     engine = engines.load("reference")
-    reason = engine.why_not(case, "cvode")
-    if reason is not None:
+    if (reason := engine.why_not(case, "cvode")) is not None:
         return reason
     rtol = max(SECOND_RTOL, case.tight)
     other = engine.prepare(
@@ -164,8 +163,7 @@ def _against(truth: Truth, run: Trajectory, case: Case) -> Error:
     some and not by others.
     """
     truth, run = replace(truth, trajectory=lasting(truth.trajectory)), lasting(run)
-    more = len(contacts(run)) - len(contacts(truth.trajectory))
-    if not more:
+    if not (more := len(contacts(run)) - len(contacts(truth.trajectory))):
         return _matched(truth, run, case)
     value = float(_apart(truth, run).max())
     return Error(value=value, tier=truth.tier.value, until=case.t_end, why=f"{more:+d} contacts, error {value:.2e}")

@@ -54,8 +54,7 @@ class Baseline:
             return
         if not self.path.is_file():
             raise AssertionError(f"There is no baseline {self.path}: run once with --crossbody-update and commit it.")
-        told = list(_differences(found, self._read(), rtol, atol))
-        if told:
+        if told := list(_differences(found, self._read(), rtol, atol)):
             last = f"If that is meant, run again with --crossbody-update ({self.path})."
             raise AssertionError("\n".join([*told, last]))
 

@@ -58,8 +58,7 @@ class Signal:
 
 def fail_if_any(sentences: list[str]) -> None:
     """Raise AssertionError with all sentences that are not empty."""
-    told = [text for text in sentences if text]
-    if told:
+    if told := [text for text in sentences if text]:
         raise AssertionError("\n".join(told))
 
 

@@ -56,8 +56,7 @@ def bounds(kind: str, size: Any, points: Any, p: Any, R: Any) -> list[float]:
 def composite(parts: Any, p: Any, R: Any) -> list[float]:
     """Return mass, centre and inertia about it of parts in a frame."""
     p, R = np.asarray(p), np.asarray(R)
-    mass = sum(part[1] for part in parts)
-    if not mass:
+    if not (mass := sum(part[1] for part in parts)):
         return [0.0, *np.zeros(9)]
     centre = sum(part[1] * np.asarray(part[2]) for part in parts) / mass
     J = np.zeros((3, 3))
