@@ -15,7 +15,6 @@ from crossbody.cases.arrays import Floats
 from crossbody.reference.linear import LinearModel, locus
 from crossbody.reports.analysis.places import Place, places
 
-LOCUS = ("place", "parameter", "value", "branch", "real", "imag")
 LIMITS = ("place", "parameter", "value", "unstable", "frequency")
 AT_REST = 1e-7
 """Part of the fastest pole below which one stands at 0 and says nothing about stability: what a loop
@@ -59,7 +58,7 @@ class Family:
 
 
 def root_locus(family: Family, values: Sequence[float]) -> pd.DataFrame:
-    """Poles of every place, joined to branches: one row a pole, columns `LOCUS`.
+    """Poles of every place, joined to branches: one row a pole.
 
     Raises:
         InvalidValue: where a place has no equilibrium at some value.

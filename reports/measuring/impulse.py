@@ -20,15 +20,9 @@ def away(exact: Trajectory, instants: Sequence[float], t_end: float) -> NDArray[
     return np.min(nearest, axis=0) > SAME * t_end if nearest else np.ones(len(exact.t), dtype=bool)
 
 
-def cumulative(run: Trajectory, t: Floats | None = None) -> Floats:
-    """INT lam dt by the trapezoidal rule (n, nc), N s.
-
-    Args:
-        run: its multipliers.
-        t: other instants of the samples than the run's own.
-    """
-    t = run.t if t is None else t
-    pieces = 0.5 * np.diff(t)[:, None] * (run.lam[1:] + run.lam[:-1])
+def cumulative(run: Trajectory) -> Floats:
+    """INT lam dt by the trapezoidal rule (n, nc), N s."""
+    pieces = 0.5 * np.diff(run.t)[:, None] * (run.lam[1:] + run.lam[:-1])
     return np.concatenate([np.zeros((1, run.lam.shape[1])), np.cumsum(pieces, axis=0)])
 
 

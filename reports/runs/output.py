@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -264,12 +264,8 @@ def _unfinished(path: Path) -> list[Path]:
     return [p for p in sorted(path.iterdir()) if p.name.startswith((NEW, READY)) and p.is_dir() and not p.is_symlink()]
 
 
-def recover(path: Path, tell: Callable[[str], None] = voice.note) -> None:
+def recover(path: Path) -> None:
     """Finish what a killed process had begun: a study that was whole is put in its place, another is taken away.
-
-    Args:
-        path: an output folder; need not be there.
-        tell: is told what was found.
 
     Raises:
         OutputError: if the disk refuses.
@@ -281,17 +277,17 @@ def recover(path: Path, tell: Callable[[str], None] = voice.note) -> None:
             for left in _unfinished(path):
                 with _locked(left, wait=False) as free:
                     if free:
-                        _recover(path, left, tell)
+                        _recover(path, left)
             for half in path.glob(f"{HALF}*"):
                 half.unlink()
     except OSError as error:
         raise OutputError(f"Output folder {path} cannot be put in order: {error.strerror or error}.") from None
 
 
-def _recover(home: Path, left: Path, tell: Callable[[str], None]) -> None:
+def _recover(home: Path, left: Path) -> None:
     if left.name.startswith(READY):
         _place(home, left)
-        tell(f"{home}: results that an interrupted command had written are put in their place.")
+        voice.note(f"{home}: results that an interrupted command had written are put in their place.")
         return
     shutil.rmtree(left, ignore_errors=True)
-    tell(f"{home}: half-written tables of an interrupted command are removed.")
+    voice.note(f"{home}: half-written tables of an interrupted command are removed.")

@@ -13,7 +13,6 @@ from crossbody.cases.mechanisms.friction.scene import MASS, field
 from crossbody.cases.scene import Vector
 from crossbody.cases.trajectory import Mode
 
-Energy = Callable[[Floats, Floats], Floats]
 CORNERS = np.array([[1.0 if k >> bit & 1 else -1.0 for bit in range(3)] for k in range(8)])
 """Signs of a box's corners, in the order of their rows."""
 
