@@ -47,12 +47,10 @@ class Activations:
         return self._held(self.start)
 
     def _held(self, a: Floats) -> Floats:
-        found: Floats = np.clip(a, *self.span.T)
-        return found
+        return np.clip(a, *self.span.T)
 
     def _target(self, u: Floats) -> Floats:
-        found: Floats = np.clip(u[self.driven], *self.control.T)
-        return found
+        return np.clip(u[self.driven], *self.control.T)
 
     def after(self, a: Floats, u: Floats, dt: Floats) -> Floats:
         """Return values (na,) a time dt (na,) after a (na,) under inputs u that hold."""

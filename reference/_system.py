@@ -195,8 +195,7 @@ class System:
     @property
     def dry(self) -> NDArray[np.bool_]:
         """Which rows (nc,) have dry friction of their own."""
-        found: NDArray[np.bool_] = np.asarray(self.friction_loss) > 0.0
-        return found
+        return np.asarray(self.friction_loss) > 0.0
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -208,8 +207,7 @@ class System:
     @property
     def quaternion_entries(self) -> Index:
         """Indices in q (m, 4), of the quaternions' entries."""
-        found: Index = np.asarray(self.quaternions, dtype=np.int64).reshape(-1, 1) + np.arange(4)
-        return found
+        return np.asarray(self.quaternions, dtype=np.int64).reshape(-1, 1) + np.arange(4)
 
     @property
     def kernels(self) -> dict[str, Any]:
@@ -457,8 +455,7 @@ class System:
         """N(q) d (nq,): how positions change where velocities d (n,) act for a unit of time."""
         if self.velocity is None:
             return d
-        found: Floats = self.rates(q, d, 0.0, p) - self.rates(q, np.zeros(self.n), 0.0, p)
-        return found
+        return self.rates(q, d, 0.0, p) - self.rates(q, np.zeros(self.n), 0.0, p)
 
     def normalised(self, name: str, q: Floats) -> Floats:
         """Return positions (nq,) or (m, nq) with every quaternion of length 1.

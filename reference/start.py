@@ -153,5 +153,4 @@ def _least(state: State, rows: Index, error: Floats) -> Floats:
     """Return x with H x = error of least x^T M x, M^-1 H^T (H M^-1 H^T)^-1 error; rows may depend on each other."""
     root = np.linalg.cholesky(state.mass_matrix())
     scaled = np.linalg.solve(root, state.H[rows].T).T
-    x: Floats = np.linalg.solve(root.T, np.linalg.lstsq(scaled, error, rcond=DEPENDENT)[0])
-    return x
+    return np.linalg.solve(root.T, np.linalg.lstsq(scaled, error, rcond=DEPENDENT)[0])

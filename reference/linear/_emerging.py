@@ -146,8 +146,7 @@ def _across(at: Point, values: Floats) -> Floats:
 def _misfit_slopes(at: Point, vd: Floats, turn: Floats) -> Floats:
     """Derivative (k, k) of the parts across, by the angles, from that of the accelerations (n, k)."""
     gains = _along(at, slip_accelerations(at, at.q, at.v, vd))
-    found: Floats = _across(at, _tangents(at) @ turn) - np.diag(gains)
-    return found
+    return _across(at, _tangents(at) @ turn) - np.diag(gains)
 
 
 def _turned(at: Point, i: int, angle: complex) -> Point:

@@ -97,8 +97,7 @@ class Filter:
         keep = np.eye(len(self.z)) - gain @ self.C
         self.z = self.z + gain @ wrong
         self.P = keep @ self.P @ keep.T + gain @ self.R @ gain.T
-        whitened: Floats = np.linalg.solve(np.linalg.cholesky(S), wrong)
-        return whitened
+        return np.linalg.solve(np.linalg.cholesky(S), wrong)
 
 
 def accelerated(at: Point, record: Record, force: Floats) -> tuple[Floats, Floats]:

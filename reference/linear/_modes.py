@@ -80,8 +80,7 @@ def _span(columns: Floats, known: Floats, scale: float, tolerance: float) -> Flo
     for _ in range(2):
         columns = columns - known @ (known.T @ columns)
     left, size, _ = np.linalg.svd(columns, full_matrices=False)
-    kept: Floats = left[:, size > tolerance * scale] if scale else left[:, :0]
-    return kept
+    return left[:, size > tolerance * scale] if scale else left[:, :0]
 
 
 @checked_arguments

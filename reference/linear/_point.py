@@ -77,8 +77,7 @@ class Point:
     def given(self, name: str) -> Array:
         """What is in force: p, alpha, friction or drift."""
         own = getattr(self, name)
-        found: Array = np.asarray(getattr(self.system, name) if own is None else own)
-        return found
+        return np.asarray(getattr(self.system, name) if own is None else own)
 
     def tangents(self, i: int) -> Index:
         """Places in `active` of the tangential rows of contact i."""
@@ -185,8 +184,7 @@ def dense(blocks: Array) -> Array:
     M = np.zeros((count, k, count, k), blocks.dtype)
     each = np.arange(count)
     M[each, :, each, :] = blocks
-    dense: Array = M.reshape(count * k, count * k)
-    return dense
+    return M.reshape(count * k, count * k)
 
 
 def gaps(at: Point, q: Array, v: Array) -> Array:

@@ -313,8 +313,7 @@ class _Walk:
             return None
         change = g[:width] @ self.S
         change[width:] += g[width:]
-        shift: Floats = -change / speed
-        return shift
+        return -change / speed
 
     def _event(self, piece: list[Event]) -> bool:
         """Pass one event, or one frozen collision with all that it does; False if it is only grazed."""

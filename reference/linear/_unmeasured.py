@@ -47,8 +47,7 @@ class Estimate:
     @property
     def std(self) -> Floats:
         """Standard deviations (N, k); 1.96 of them hold 95 % of the errors of a Gaussian."""
-        deviation: Floats = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
-        return deviation
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -143,8 +143,7 @@ def gap_gradient(at: Point, over: Theta, i: int, *, rate: bool = False) -> Float
 def slips(at: Point, q: Array, v: Array, i: int) -> Array:
     """Slip velocity (1,) or (2,) of contact i."""
     rows = int(at.system.tangent[i]) + np.arange(int(at.system.tangents[i]))
-    found: Array = gaps(at, q, v)[at.system.nc + rows] - at.given("drift")[rows]
-    return found
+    return gaps(at, q, v)[at.system.nc + rows] - at.given("drift")[rows]
 
 
 def slip_speeds(at: Point, run: Trajectory) -> Floats:
@@ -196,8 +195,7 @@ def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
     def mobility(here: Point, q: Array, v: Array) -> Array:
         blocks, _, H, _, _ = terms(here, q, v, at.u)
         G = H @ np.linalg.solve(dense(blocks), H.T)
-        share: Array = 1.0 / np.linalg.inv(G)[j, j : j + 1]
-        return share
+        return 1.0 / np.linalg.inv(G)[j, j : j + 1]
 
     share = mobility(at, at.q, at.v)[0].real
     change = gradient(elastic, at, over)[0] - HANDOVER * lam[j] * gradient(mobility, at, over)[0]

@@ -97,8 +97,7 @@ class LinearModel:
             solved = np.linalg.solve(resolvent, driven)
         except np.linalg.LinAlgError:
             raise InvalidValue("LinearModel.response: a frequency is a pole, where there is no response.") from None
-        found: Complex = (self.C @ solved + self.D).astype(np.complex128)
-        return found
+        return (self.C @ solved + self.D).astype(np.complex128)
 
     @checked_arguments
     def pick(self, outputs: Sequence[str] | None = None, inputs: Sequence[str] | None = None) -> LinearModel:
