@@ -191,15 +191,8 @@ def _callable(where: str, value: object) -> object:
     return value
 
 
-def _text(where: str, value: object) -> str:
-    return instance(where, value, str, "a text")
-
-
-def _whole(where: str, value: object) -> int:
-    return whole(where, value, LOWEST)
-
-
 _PLAIN: dict[str, Check | None] = {
-    "float": finite, "int": _whole, "bool": flag, "str": _text, "Any": None, "object": None,
+    "float": finite, "int": lambda where, value: whole(where, value, LOWEST), "bool": flag,
+    "str": lambda where, value: instance(where, value, str, "a text"), "Any": None, "object": None,
 }  # fmt: skip
 _LISTED: dict[str, Check] = {"int": wholes, "str": texts}

@@ -36,9 +36,9 @@ class Numbers(Parameter):
         if not parts:
             raise InvalidValue(f"{where} is empty; it must be one number or several separated by commas.")
         each = Parameter(default=0.0, unit=self.unit, low=self.low, high=self.high, open_low=self.open_low)
-        return ",".join(
-            _shortest(each.checked(where if len(parts) == 1 else f"{where}[{i}]", part)) for i, part in enumerate(parts)
-        )
+        places = [f"{where}[{i}]" for i in range(len(parts))] if len(parts) > 1 else [where]
+        numbers = [float(each.checked(*pair)) for pair in zip(places, parts, strict=True)]
+        return ",".join(repr(number).removesuffix(".0") for number in numbers)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,10 +70,6 @@ def spread(where: str, text: Value, count: int) -> Floats:
     if len(found) not in (1, count):
         raise InvalidValue(f"{where} lists {len(found)} numbers; valid: one for all, or {count} separated by commas.")
     return np.repeat(found, count) if len(found) == 1 else found
-
-
-def _shortest(number: Value) -> str:
-    return repr(float(number)).removesuffix(".0")
 
 
 def of_numbers(parameters: Mapping[str, Value]) -> dict[str, float]:

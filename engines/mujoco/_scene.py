@@ -12,15 +12,6 @@ from crossbody.engines._log import Modes, Observe
 from crossbody.engines.mujoco._globals import Hook
 
 
-def _goes_on() -> str:
-    """Nothing ends a motion before its horizon."""
-    return ""
-
-
-def _nothing(_t: float) -> None:
-    """No input changes."""
-
-
 @dataclass(slots=True, kw_only=True)
 class Scene:
     """A compiled model with views and closures on it.
@@ -65,7 +56,7 @@ class Scene:
     safe: Callable[[], bool]
     observe: Observe
     instants: Sequence[float] = ()
-    change: Callable[[float], None] = _nothing
+    change: Callable[[float], None] = lambda _t: None
     acting: Acting | None = None
     hook: Hook | None = None
     always: bool = False
@@ -73,7 +64,7 @@ class Scene:
     margins: Callable[[], list[tuple[float, float]]] | None = None
     entered: Callable[[Sequence[int]], Modes] = tuple
     outlives: bool = False
-    lost: Callable[[], str] = _goes_on
+    lost: Callable[[], str] = lambda: ""  # nothing ends a motion before its horizon
     switches: Sequence[Switch] = ()
     follows: Sequence[int] = ()
     machine: str = "memoryless"

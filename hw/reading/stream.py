@@ -60,9 +60,8 @@ class Stream:
         """Stored times to seconds; integers that no float64 holds count from the log's first."""
         unit = unit_of_ticks(raw) if not self.plan.told and not self._begun else "s"
         if unit != "s":
-            text = (
-                f'has steps of {_usual(raw):.3g} and no unit: as seconds, no rig\'s. Write `unit` ("{unit}"?) for it.'
-            )
+            step = float(np.median(np.abs(np.diff(raw[:1000].astype(np.float64)))))
+            text = f'has steps of {step:.3g} and no unit: as seconds, no rig\'s. Write `unit` ("{unit}"?) for it.'
             raise LogFormatError(self.plan.path, text, column=column)
         if raw.dtype.kind in "iu":
             if not self._begun and len(raw):
@@ -105,10 +104,6 @@ class Stream:
                 )
             found.update(np.unique(block[column]).astype(int).tolist())
         return tuple(sorted(found))
-
-
-def _usual(raw: NDArray[Any]) -> float:
-    return float(np.median(np.abs(np.diff(raw[:1000].astype(np.float64)))))
 
 
 def collect(blocks: Iterable[Rows], plan: Plan, group: Group, limit: int) -> Rows:

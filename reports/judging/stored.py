@@ -85,20 +85,20 @@ def write(measured: Iterable[tuple[Case, Entry, Deviations, float]]) -> None:
     fresh: dict[str, Any] = {}
     for case, entry, found, trusted in measured:
         if case.label not in fresh:
-            old, head = table.get(case.label, {}), {"parameters": _digest(case), **_end(case, trusted)}
+            old, end = table.get(case.label, {}), float(f"{trusted:.3g}")
+            head = {"parameters": _digest(case)} | ({"compared": end} if trusted < case.t_end else {})
             kept = dict(old["runs"]) if {k: v for k, v in old.items() if k != "runs"} == head else {}
             fresh[case.label] = head | {"runs": kept}
         fresh[case.label]["runs"][f"{entry.engine}:{entry.profile}"] = {
             "settings": words(entry.settings),
-            "deviations": {metric: _short(value) for metric, value in sorted(found.items())},
+            "deviations": {
+                metric: float(f"{value:.3g}") if math.isfinite(value) else str(value)  # JSON has no number for it
+                for metric, value in sorted(found.items())
+            },
         }
     lines = [f"{json.dumps(label)}: {_block(runs)}" for label, runs in sorted((table | fresh).items())]
     FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     _table.cache_clear()
-
-
-def _end(case: Case, trusted: float) -> dict[str, float]:
-    return {"compared": float(f"{trusted:.3g}")} if trusted < case.t_end else {}
 
 
 def _block(stored: Mapping[str, Any]) -> str:
@@ -106,8 +106,3 @@ def _block(stored: Mapping[str, Any]) -> str:
     runs = ",\n  ".join(f"{json.dumps(who)}: {json.dumps(run)}" for who, run in stored["runs"].items())
     head = json.dumps({name: value for name, value in stored.items() if name != "runs"})
     return f'{head[:-1]}, "runs": {{\n  {runs}}}}}'
-
-
-def _short(value: float) -> float | str:
-    """Three digits; a word for what JSON has no number for."""
-    return float(f"{value:.3g}") if math.isfinite(value) else str(value)

@@ -13,6 +13,7 @@ from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES
 from crossbody.reports.maps.gapmap import PATTERN
 
+FAILED = {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": "crimson"}}
 ROWS = {"energy_created": "energy created / energy in", PATTERN: "pattern distance / speed in"}
 
 
@@ -105,7 +106,8 @@ def stress_map(cells: pd.DataFrame) -> Figure:
     for i, ((_, _, knob), group) in enumerate(groups):
         row, column = i // 2 + 1, i % 2 + 1
         panels.add(row, column, **_field(group, i == 0))
-        panels.add(row, column, **_failed(group))
+        failed = group[group["finished"].astype(float) < group["runs"].astype(float)]
+        panels.add(row, column, **_places(failed), marker=FAILED)
         panels.axes("y", row, column, type="log", title="rtol" if knob == "rtol" else "dt [s]")
         panels.axes("x", row, column, type="log", title="a0 [1/s^2]")
     panels.axes("x", exponentformat="power")
@@ -122,11 +124,6 @@ def _field(group: pd.DataFrame, scale: bool) -> dict[str, Any]:
         "colorbar": {"title": {"text": "log10 error"}},
     }  # fmt: skip
     return _places(known) | {"marker": marker}
-
-
-def _failed(group: pd.DataFrame) -> dict[str, Any]:
-    bad = group[group["finished"].astype(float) < group["runs"].astype(float)]
-    return _places(bad) | {"marker": {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": "crimson"}}}
 
 
 def _places(cells: pd.DataFrame) -> dict[str, Any]:

@@ -7,7 +7,7 @@ collisions overlap, to s of some units, where they are over before the next begi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -156,8 +156,14 @@ def _measured(case: Case, run: Trajectory) -> dict[str, Any]:
         "energy_created": float(run.total_energy[-1]) / brought - 1.0,
         "energy_switching": math.nan if jumps is None else jumps / brought,
         "momentum": float(run.v[-1] @ balls.masses) / momentum - 1.0,
-        "nearest": next(name[len("to_") :] for name, off in known.items() if off <= min(known.values()) + TIE),
+        "nearest": _nearest(known),
     }  # fmt: skip
+
+
+def _nearest(apart: Mapping[str, float]) -> str:
+    """The rule that is followed most closely; of those equally close the first."""
+    least = min(apart.values())
+    return next(name.removeprefix("to_") for name, value in apart.items() if value <= least + TIE)
 
 
 def summary(rows: pd.DataFrame, ideal: float = 1e-3) -> pd.DataFrame:

@@ -142,12 +142,10 @@ def _run(trace: Trace) -> dict[str, Any]:
         "who": label(trace), "outcome": f"{run.outcome.value} {run.message}".strip(), "steps": run.steps,
         "events": len(run.events), "wall_ms": 1e3 * run.wall_s if run.wall_s else None,
         "control_ms": 1e3 * run.control_s if run.control_s else None, "samples": len(run.t),
-        "settings": ", ".join(f"{k} = {_shown(v)}" for k, v in settings.items() if k != "samples"),
+        "settings": ", ".join(
+            f"{k} = {v:.6g}" if isinstance(v, float) else f"{k} = {v}" for k, v in settings.items() if k != "samples"
+        ),
     }  # fmt: skip
-
-
-def _shown(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _audit(found: Results, case: CaseFiles) -> Section:

@@ -10,6 +10,7 @@ from four_bars import four_bar
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier
+from crossbody.cases.contacts import contacts
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.engines.pinocchio._joined import none_pulling
 from crossbody.reports import metrics
@@ -38,7 +39,7 @@ def test_rows_that_others_hold_are_no_contacts_and_no_unknown_numbers(seed: int,
     assert found["complementarity"] < 1e-9
     assert found["law_residual"] is not None
     assert found["law_residual"] < 1e-7
-    met = {contact.row for contact in metrics.load("touch_count").contacts(run, True)}
+    met = {contact.row for contact in contacts(run, True)}
     assert all(case.law.unilateral[row] for row in met), "what is always on touches nothing"
     assert violated(case, run, RTOL) == ()
 
