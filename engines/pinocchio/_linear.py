@@ -142,8 +142,8 @@ def of_rows(rows: PinRows, spot: Spot) -> Stand:
         return gamma
 
     return Stand(
-        model=rows.model, data=rows.data, q=spot.q, v=spot.v, chart=same(len(spot.q)), force=force,
-        jacobian=lambda q: np.array(rows.jacobian(q)[on]), law=law,
+        model=rows.model, data=rows.data, q=np.array(spot.q), v=np.array(spot.v), chart=same(len(spot.q)),
+        force=force, jacobian=lambda q: np.array(rows.jacobian(q)[on]), law=law,
     )  # fmt: skip
 
 
