@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from crossbody.cases import Case, Coordinate, Limit, Parameter, SceneError, Trajectory, UnknownName, Value, arguments
 from crossbody.cases.arrays import Floats
-from crossbody.hw.reading.log import Log
+
+if TYPE_CHECKING:
+    from crossbody.hw.reading.log import Log
 
 Numbers = Mapping[str, Value]
 
