@@ -173,11 +173,31 @@ def test_replay_has_limits_and_an_exit_code(
     limits: list[str], expected: int, two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     options = [word for limit in limits for word in ("--limit", limit)]
-    asked = ("replay", two_frictions, *ONE, "-e", "reference", *options, "--json", "--out", tmp_path / "out")
+    asked = ("replay", two_frictions, *ONE, "-e", "reference", *options, "--out", tmp_path)
     assert code(*asked) == expected
-    rows = json.loads(capsys.readouterr().out)["metrics"]
+    rows = json.loads((tmp_path / "replay.json").read_text(encoding="utf-8"))["rows"]
     judged = [row["verdict"] for row in rows if row["verdict"] != "not judged"]
     assert set(judged) == ({"outside", "within"} if expected else {"within"})
+    told = re.findall("^outside: reference:compiled ([a-z]+)", capsys.readouterr().out, re.MULTILINE)
+    assert told == [row["metric"] for row in rows if row["verdict"] == "outside"]
+
+
+def test_what_was_identified_is_replayed_as_replay_does(
+    two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With its windows, its settings and its delay: both commands tell the same numbers of the same parameters."""
+    same = ("-m", "single_pendulum", "--restart", "0.5", "--horizon", "0.4", "--set", "a1=0.4", "--delay", "0.02")
+    assert code("identify", two_frictions, *same, "-f", "k1", "--limit", "held_out_worse=1e9", "--json",
+                "--out", tmp_path / "one") == 0  # fmt: skip
+    told = json.loads(capsys.readouterr().out)
+    found = told["identify"][0]["value"]
+    asked = ("replay", two_frictions, *same, "--set", f"k1={found!r}", "-e", "reference")
+    assert code(*asked, "--json", "--out", tmp_path / "two") == 0
+    of_identify, of_replay = (
+        {(row["metric"], row["channel"]): row["value"] for row in rows if row["metric"] != "speed"}
+        for rows in (told["metrics"], json.loads(capsys.readouterr().out)["metrics"])
+    )
+    assert of_identify == pytest.approx(of_replay, nan_ok=True)
 
 
 def test_a_limit_on_any_metric_is_its_verdict(two_frictions: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -66,6 +69,31 @@ def test_the_recorded_reference_drives_model_and_controller(plant: hw.Plant) -> 
     assert worst(known) < 5e-4
     rows = {(r.metric, r.channel): r.value for r in known.rows()}
     assert min(rows["fit", c.name] for c in known.coordinates) > 99.0
+
+
+def test_when_the_clock_of_a_log_began_changes_nothing(plant: hw.Plant) -> None:
+    log = hw.delta_log(plant).window(0.0, 0.3)
+    later = replace(log, time=log.time + 64.0)
+    for kind in ("forward", "closed_loop"):
+        one, other = (hw.replay(each, "delta", kind=kind, restart=0.0, delay=DELAY) for each in (log, later))
+        np.testing.assert_allclose(
+            other.residual(other.predictions[0]), one.residual(one.predictions[0]), atol=1e-8, err_msg=kind
+        )
+    for found in (hw.inverse, hw.estimate_force, partial(hw.track_force, size=3.0, memory=0.1)):
+        one, other = (found(each, "delta", delay=DELAY, stride=5) for each in (log, later))
+        np.testing.assert_allclose(other.t - 64.0, one.t, atol=1e-12)
+        np.testing.assert_allclose(other.value, one.value, atol=1e-5 * np.abs(one.value).max())
+
+
+def test_a_delay_that_is_known_changes_no_force(pushed: hw.Plant) -> None:
+    """Angles that come 20 samples late tell, at their own times, what they tell at once."""
+    late = 20 * float(np.diff(pushed.t[:2])[0])
+    logs = [hw.delta_log(pushed, replace(QUIET, delay=delay)) for delay in (0.0, late)]
+    for force in (hw.estimate_force, partial(hw.track_force, size=3.0, memory=0.1)):
+        found = [force(log, "delta", delay=delay, stride=2) for log, delay in zip(logs, (0.0, late), strict=True)]
+        t = found[0].t[(found[0].t > 0.55) & (found[0].t < 0.65)]
+        pushes = [[np.interp(t, one.t, f).mean() for f in one.value.T] for one in found]
+        np.testing.assert_allclose(pushes, [PUSHES[0].force] * 2, atol=0.1)
 
 
 def test_torque_that_the_motion_needs_is_the_recorded_one(plant: hw.Plant) -> None:
