@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -66,6 +67,16 @@ def test_a_fault_is_shown_with_everything_else_and_exits_with_2(
     assert "torque" in told.out
     assert told.err.count("\n") == 1
     assert "row 31" in told.err
+
+
+def test_a_map_decides_what_json_finds(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("log", "info", path, "--draft") == 0
+    drafted = capsys.readouterr().out
+    (tmp_path / "map.toml").write_text(drafted.replace("[coordinates.angle]", "[coordinates.angle]\nrange = [-1, 1]"))
+    assert call("log", "info", path, "--columns", tmp_path / "map.toml", "--json") == 2
+    told = json.loads(capsys.readouterr().out)["findings"]
+    assert [one["check"] for one in told if one["fault"]] == ["range"]
+    assert [one["row"] for one in told] == [one.row for one in hw.check(path, tmp_path / "map.toml")]
 
 
 @pytest.mark.parametrize("cell", ["=1+1", "@SUM(A1)", "open"])

@@ -58,6 +58,16 @@ def test_a_late_touch_is_an_error_in_time_not_in_speed() -> None:
         assert_agrees(late, MOTION)
 
 
+def test_a_touch_at_the_right_instant_of_another_row_is_named() -> None:
+    case = cases.load("newtons_cradle", t_end=0.6)
+    run = engines.load("reference").prepare(case).run()
+    rows = len(case.contacts)
+    other = replace(run, events=tuple(replace(e, contact=rows - 1 - e.contact) for e in run.events))
+    assert_agrees(run, run, of=("q",))
+    with pytest.raises(AssertionError, match=r"Touch 0 is of row (\d) at (t = [\d.]+) s where row (?!\1)\d at \2 s is"):
+        assert_agrees(other, run, of=("q",))
+
+
 def test_a_touch_too_many_or_too_few_is_named() -> None:
     fewer = replace(MOTION, events=MOTION.events[:1])
     with pytest.raises(
