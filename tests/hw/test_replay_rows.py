@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rig_data import channels, log_of
 
+from crossbody import hw
 from crossbody.cases import Coordinate, Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.hw.models.contract import Segment
 from crossbody.hw.replaying.comparison import Comparison, Prediction
+from crossbody.hw.windows import window as cutting
+from crossbody.hw.windows.run import REFERENCE, run_window
 from crossbody.hw.windows.window import Window
 
 STEP, MASS = 0.01, 2.5
@@ -102,3 +107,18 @@ def test_each_coordinate_has_a_delay_of_its_own(samples: float) -> None:
     found = compared([window(t, motion(t, 0.0)) for t in times], [motion(t, samples * STEP) for t in times])
     assert found["delay", "angle"] == pytest.approx(samples * STEP, abs=1e-4)
     assert found["delay", "height"] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_settings_that_are_asked_for_stand_before_those_of_the_model_and_these_before_the_usual() -> None:
+    usual = hw.models.load("single_pendulum")
+    loose = replace(usual, settings={"reference": {"rtol": 1e-4, "max_steps": 9999}})
+    t = STEP * np.arange(20)
+    log = log_of(t, channels("coordinates", "rad", {"th1": np.cos(t)}))
+    cut = cutting.windows(log, usual, restart=0.0)[0]
+    for model, asked, wanted in (
+        (usual, {}, {"rtol": REFERENCE["rtol"]}),
+        (loose, {}, {"rtol": 1e-4, "max_steps": 9999}),
+        (loose, {"rtol": 1e-6}, {"rtol": 1e-6, "max_steps": 9999}),
+    ):
+        _, used = run_window(model, model.numbers(None), cut, "reference", "matched", asked)
+        assert {name: used[name] for name in wanted} == wanted

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import hypothesis.strategies as st
@@ -25,7 +26,7 @@ from crossbody.reports.judging.comparison import Entry, compare, judged, truth_r
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.verdict import FACTOR, Regression, Word, band, exit_code, judge, limit_for
-from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.measuring.truth import TRUTH, from_run
 from crossbody.reports.runs import jobs
 from crossbody.reports.runs.choice import picks
 
@@ -93,6 +94,42 @@ def test_a_number_that_is_missing_has_one_word(
         assert ("3 claimed: a figure" in row.why) == claimed
     if row.verdict != Word.INFO:
         assert row.tier == (Tier.B if claimed else Tier.A).value
+
+
+@given(
+    value=st.sampled_from([None, math.nan, 0.5]), needs=st.sampled_from(["", "lam"]), hidden=st.booleans(),
+    claimed=st.booleans(), limited=st.booleans(), shown=st.booleans(),
+)  # fmt: skip
+def test_a_number_that_is_none_is_told_if_it_is_asked_for_or_the_run_should_have_it(
+    value: float | None,
+    needs: str,
+    hidden: bool,
+    claimed: bool,
+    limited: bool,
+    shown: bool,
+    case: Case,
+    motion: Trajectory,
+) -> None:
+    """Not if nobody asks for it and the run lacks what it needs; nor of a limit that the truth itself lacks."""
+    limit, claim = replace(LIMIT, metric="x"), replace(CLAIM, metric="x")
+    untold = {"lam": "not shown"} if hidden else {}
+    true = from_run(replace(motion), Tier.A, "itself")
+    judge_ = comparison._Judge(case, Entry(engine="fake", profile="good", hidden=untold), true, "run")
+    judge_.limits, judge_.claims, judge_.stored = (limit,) * limited, {"x": claim} if claimed else {}, {}
+    metric: Any = SimpleNamespace(
+        UNIT="1", measure=lambda _, run, __: value if run is motion else 1.0 if shown else None
+    )
+    if needs:
+        metric.NEEDS = needs
+    row = comparison._row(judge_, metric, "x", claimed or limited, true, motion)
+    lacks = value is None or (math.isnan(value) and needs and (hidden or not (claimed or limited)))
+    if lacks and not claimed and not (limited and shown):
+        assert row is None
+        return
+    assert row is not None
+    assert (row.value == 0.5) == (value == 0.5)
+    if value != 0.5:
+        assert row.verdict == (Word.INFO if lacks and needs and hidden else Word.OUTSIDE)
 
 
 @given(
