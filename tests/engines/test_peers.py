@@ -10,8 +10,10 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, EngineUnavailable, Mode, Outcome
+from crossbody.cases.scene import Body, Joint, Loop, Scene, Tendon
 from crossbody.engines._line import line
 from crossbody.engines._peer import ended, sampled
+from crossbody.engines.equations import system_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import audit
 from crossbody.reports.judging.comparison import judged
@@ -192,6 +194,27 @@ class _Absent:
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         if name.partition(".")[0] == self.package:
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rows_of_a_line_are_those_of_its_scene(seed: int) -> None:
+    """Held coordinates, bounds on both sides and of a difference, with references and values that are drawn."""
+    rng, along = np.random.default_rng(seed), (0.0, 0.0, 1.0)
+    low, high, held, *references = rng.uniform(0.1, 1.0, 6).tolist()
+    names = ("a", "b", "c")
+    joints = [
+        Joint(name=n, body=n, type="slide", axis=along, reference=x, range=(-low, high if n == "b" else np.inf))
+        for n, x in zip(names, references, strict=True)
+    ]
+    scene = Scene(
+        bodies=tuple(Body(name=n, mass=1.0, position=tuple(rng.normal(size=3).tolist())) for n in names),
+        joints=tuple(joints),
+        loops=(Loop(name="held", type="joint", first="a", polynomial=(held, 0.0, 0.0, 0.0, 0.0)),),
+        tendons=(Tendon(name="t", joints=("b", "c"), coefficients=(1.0, -1.0), range=(-low, np.inf)),),
+    )
+    case = cases.from_scene(scene, q0=[references[0] + held, 0.0, 0.0], t_end=1.0)
+    q = rng.normal(size=3)
+    assert line(case).gaps(q) == pytest.approx(system_of(case).gap(q)[0], abs=1e-14)
 
 
 def test_touches_between_steps_are_put_in_where_free_flight_has_them() -> None:
