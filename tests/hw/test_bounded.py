@@ -69,6 +69,27 @@ def test_a_file_has_the_more_time_the_larger_it_is(size: int, memory: int) -> No
     assert (found.memory, found.most) == (memory + size, memory // 4 + 100 * size)
 
 
+@given(st.lists(st.integers(0, 3 * 2**20), min_size=1, max_size=8))
+def test_what_is_decoded_adds_up(pieces: list[int]) -> None:
+    found = Budget(Path("rig.mcap"), 2**24)
+    refused = next((k for k in range(len(pieces)) if sum(pieces[: k + 1]) > 2**22), None)
+    for k, piece in enumerate(pieces[: None if refused is None else refused + 1]):
+        if k == refused:
+            with pytest.raises(LogFormatError, match=r"decompresses to more than 4\.19 MB"):
+                found.spend(piece)
+        else:
+            found.spend(piece)
+
+
+def test_holes_of_a_file_and_the_rest_of_its_last_block_do_not_count(tmp_path: Path) -> None:
+    for name, content, whole in (("small", b"x" * 10, 10), ("sparse", b"", 2**26), ("full", b"x" * 2**16, 2**16)):
+        with (tmp_path / name).open("wb") as file:
+            file.write(content)
+            file.truncate(whole)
+        assert Budget(tmp_path / name).size == len(content)
+    assert Budget(tmp_path).size == 10 + 2**16
+
+
 def test_topics_that_are_not_read_say_why(tmp_path: Path) -> None:
     """Of a file with five of them one is read; no other vanishes."""
     writing = pytest.importorskip("mcap.writer")

@@ -13,7 +13,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from crossbody import engines
+from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory, UnknownName
 from crossbody.reports.bench import measure
 from crossbody.reports.bench.ladder import Effort
@@ -283,6 +283,13 @@ def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.Cap
     assert "fake:off  dt=0.004" in said
     assert "absent:*  skipped: Engine 'absent' needs" in said
     assert list(Path.cwd().iterdir()) == []
+
+
+def test_a_plan_counts_velocities_where_a_quaternion_has_more_positions(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "rolling_sphere", "--dry-run") == 0
+    case = cases.load("rolling_sphere")
+    assert len(case.q0) != len(case.v0)
+    assert f" {len(case.v0)} velocities, {len(case.contacts)} rows, {case.t_end:g} s" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("dry", [(), ("--dry-run",)])
