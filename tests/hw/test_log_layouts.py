@@ -220,6 +220,22 @@ def test_an_angle_that_joins_a_log_from_other_rows_goes_on_over_a_turn_or_is_ref
     assert (told.name, told.rows, told.row, told.t) == ("unwrap", len(wraps), wraps[0], pytest.approx(own[wraps[0]]))
 
 
+@pytest.mark.parametrize("begins", [(0.3, 0.1, 0.2), (0.1, 0.3, 0.2), (0.1, 0.2, 0.3)])
+def test_a_log_begins_where_the_last_of_its_clocks_does(begins: tuple[float, ...], tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    t = np.arange(100) * 0.01
+    clocks = {f"t{i}": begin + np.arange(80) * 0.02 for i, begin in enumerate(begins)}
+    savemat(tmp_path / "log.mat", {"t": t, "u": np.cos(t)} | clocks | {f"x{i}": clocks[f"t{i}"] for i in range(3)})
+    signals = "".join(f'[sensors.x{i}]\ncolumn = "x{i}"\nunit = "s"\ntime = "t{i}"\n' for i in range(3))
+    columns = f'join = "linear"\n[time]\ncolumn = "t"\n[sensors.u]\ncolumn = "u"\nunit = "1"\n{signals}'
+    log = hw.read(tmp_path / "log.mat", hw.parse_columns(columns))
+    assert log.time == pytest.approx(t[t > 0.299])
+    for name, values in (("u", np.cos(log.time)), *((f"x{i}", log.time) for i in range(3))):
+        np.testing.assert_allclose(log.channel("sensors", name).values, values, atol=1e-12)
+    assert [(one.name, one.rows) for one in log.provenance.repairs] == [("trim", 30)]
+
+
 def test_what_a_map_does_not_say_changes_nothing(tmp_path: Path) -> None:
     t, x = np.arange(50) * 0.125, np.random.default_rng(0).normal(size=50)
     np.savetxt(tmp_path / "log.csv", np.column_stack([t, x]), "%.17g", delimiter=",", header="t,x", comments="")

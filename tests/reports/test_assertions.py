@@ -118,6 +118,23 @@ def test_energy_is_held_against_its_account(integrated: Trajectory) -> None:
         assert_energy(replace(integrated, energy=made))
 
 
+@pytest.mark.parametrize(
+    ("case", "part"),
+    [
+        (cases.load("delta_free", t_end=0.1), "dissipated"),
+        (cases.load("delta_impulse", t_end=0.1, start=0.02), "input"),
+    ],
+)
+def test_the_account_holds_what_dampers_take_and_inputs_bring(case: cases.Case, part: str) -> None:
+    run = engines.load("reference").prepare(case, "compiled", ledger=True).run()
+    assert run.ledger is not None
+    book = getattr(run.ledger, part)
+    assert np.ptp(book) > 1e-5 * run.energy[:, 0].max()
+    assert_energy(run)
+    with pytest.raises(AssertionError, match="is off first"):
+        assert_energy(replace(run, ledger=replace(run.ledger, **{part: -book})))
+
+
 def test_baselines_hold_every_number_and_name_what_moved(tmp_path: Path) -> None:
     path = tmp_path / "kept" / "one.json"
     values = {"drift": 1e-7, "none": math.nan, "far": -math.inf}

@@ -96,6 +96,17 @@ def test_a_number_that_is_missing_has_one_word(
         assert row.tier == (Tier.B if claimed else Tier.A).value
 
 
+def test_what_is_stored_of_a_run_that_fails_its_audit_is_all_that_is_measured(case: Case, motion: Trajectory) -> None:
+    """Judged it ends there, as no size is known yet."""
+    row = AuditRow(quantity="M", mine="1", theirs="2", difference=0.5, tolerance=1e-9)
+    entry, true = Entry(engine="fake", profile="good", run=motion), truth_of(case)
+    plain = comparison.measured(case, entry, true)
+    assert len(plain) > 5
+    failed = replace(entry, audit=(row, replace(row, quantity="h", difference=0.0)))
+    assert comparison.measured(case, failed, true) == pytest.approx(plain | {"audit M": 0.5}, nan_ok=True)
+    assert {one.metric for one in judged(case, [failed], true, "") if one.engine == "fake"} == {"finished", "audit"}
+
+
 @given(
     value=st.sampled_from([None, math.nan, 0.5]), needs=st.sampled_from(["", "lam"]), hidden=st.booleans(),
     claimed=st.booleans(), limited=st.booleans(), shown=st.booleans(),
