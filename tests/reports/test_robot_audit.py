@@ -293,3 +293,18 @@ def test_json_of_a_file_that_is_fixed_is_one_document(tmp_path: Path, capsys: py
     path.write_text(ARM)
     _, out, _ = run(["audit", str(path), "-e", "mujoco", "--json", "--fix", str(tmp_path / "plain.xml")], capsys)
     assert json.loads(out)
+
+
+def test_shapes_that_may_touch_by_either_mask_or_a_pair_of_their_own_are_compared(tmp_path: Path) -> None:
+    geoms = {  # contype, conaffinity
+        "meets": (1, 0), "met": (0, 2), "both": (3, 1), "paired": (0, 0), "pairing": (0, 0), "ghost": (0, 0),
+    }  # fmt: skip
+    bodies = "".join(
+        f'<body pos="{i} 0 1"><joint type="slide"/>'
+        f'<geom name="{name}" size=".1" contype="{a}" conaffinity="{b}"/></body>'
+        for i, (name, (a, b)) in enumerate(geoms.items())
+    )
+    pair = '<contact><pair geom1="paired" geom2="pairing"/></contact>'
+    path = tmp_path / "robot.xml"
+    path.write_text(f"<mujoco><worldbody>{bodies}</worldbody>{pair}</mujoco>")
+    assert {shape[0] for shape in opened(path).wanted["shapes"]} == geoms.keys() - {"ghost"}

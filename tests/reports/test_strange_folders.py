@@ -22,7 +22,7 @@ from crossbody.reports.cli import main
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.pages import site
-from crossbody.reports.runs import files, store, study
+from crossbody.reports.runs import files, manifest, store, study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
 
@@ -167,6 +167,23 @@ def test_no_link_is_followed_on_writing(out: Path, tmp_path: Path, capsys: pytes
         (out / name).unlink()
     site.write(out, others=[base])
     assert precious.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["bench.json", "case.html"])
+def test_what_stands_where_a_file_of_ours_was_is_not_ours(out: Path, tmp_path: Path, name: str) -> None:
+    """A link, even to its own content, a folder, or another content; what is gone or as it was remains ours."""
+    (out / name).write_text("ours")
+    manifest.write(out, manifest.read(out).updated("bench", [name]))
+    named = manifest.read(out).files
+    assert name in named
+    (out / name).rename(tmp_path / "moved")
+    assert manifest.read(out).files == named
+    for put in (lambda: (out / name).symlink_to(tmp_path / "moved"), lambda: (out / name).write_text("theirs")):
+        put()
+        assert manifest.read(out).files == named - {name}
+        (out / name).unlink()
+    (out / name).mkdir()
+    assert manifest.read(out).files == named - {name}
 
 
 def test_a_pipe_is_not_waited_for(out: Path) -> None:
