@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crossbody.reports.importers.compare import OK, QUANTITIES, Row
+from crossbody.reports.importers.told import grid
 from crossbody.reports.judging.told import NAMED, runs_of, sentence
 from crossbody.reports.judging.verdict import Word
 
@@ -85,3 +87,19 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
 def test_the_sentence_says_why_a_truth_is_known_in_part(why: str, said: str) -> None:
     rows = [row("fake:one", Word.WITHIN), row("truth:", Word.WITHIN, "truth", why=why, compared=0.2)]
     assert f"ball:hard, 0.2 of the horizon{said}." in sentence(runs_of(rows))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_grid_has_every_quantity_that_any_engine_has_and_nothing_where_one_lacks_it(seed: int) -> None:
+    rng, engines = np.random.default_rng(seed), ("one", "two", "three")
+    rows = [
+        Row(engine=engine, version="" if engine == "two" else "1.0", quantity=quantity)
+        for engine in engines for quantity in QUANTITIES if rng.random() < 0.3
+    ]  # fmt: skip
+    told = {(row.engine, row.quantity) for row in rows}
+    heading, versions, *lines = grid(rows)
+    assert set(heading[1:]) == {engine for engine, _ in told}
+    assert dict(zip(heading[1:], versions[1:], strict=True)) == {e: "" if e == "two" else "1.0" for e in heading[1:]}
+    assert [line[0] for line in lines] == [one for one in QUANTITIES if any(one == quantity for _, quantity in told)]
+    shown = {(heading[i], line[0]) for line in lines for i, cell in enumerate(line) if i and cell == OK}
+    assert shown == told
