@@ -163,6 +163,9 @@ def test_one_pytest_item_a_reader_and_quantity(
     counts = found.parseoutcomes()
     assert counts["failed"] == 3  # gravity, bias and energy
     found.stdout.fnmatch_lines(["PASSED *arm.xml::mujoco::gravity", "FAILED *arm.xml::pinocchio::gravity*"])
+    asked = ("--crossbody-case", "bouncing_ball:linear", "--crossbody-audit", "arm.xml", "--crossbody-engine", "mujoco")
+    found = pytester.runpytest_subprocess(*asked, "--collect-only", "-q")
+    found.stdout.fnmatch_lines_random(["*bouncing_ball:linear::mujoco*::finished", "*arm.xml::mujoco::gravity"])
     found = pytester.runpytest_subprocess("--crossbody-audit", "none.xml")
     found.stdout.fnmatch_lines(["*There is no robot file*"])
 
