@@ -51,6 +51,12 @@ def test_a_delay_is_looked_for_up_to_a_quarter_of_the_record(part: float) -> Non
         assert not abs(found) > 0.25 * 2000 * STEP
 
 
+@pytest.mark.parametrize("lengths", [(7,), (7, 400), (400, 8), (5, 6, 7)])
+def test_a_delay_by_half_a_period_is_unknown_however_short_the_windows(lengths: tuple[int, ...]) -> None:
+    moved = [(-1.0) ** np.arange(n) for n in lengths]
+    assert np.isnan(_measures.shift(moved, [-x for x in moved], 1e-2))
+
+
 def test_delay_of_what_does_not_move_is_unknown() -> None:
     assert np.isnan(_measures.delay(np.ones(100), np.ones(100), STEP))
 

@@ -87,7 +87,7 @@ class Tree:
         # By their content: a fault comes and goes within the second by which times would tell it.
         compileall.compile_dir(package, quiet=2, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
         shutil.copytree(ROOT / "tests", folder / "tests", ignore=shutil.ignore_patterns("__pycache__"))
-        for name in ("pyproject.toml", "docs", "README.md", "Makefile", ".ci"):
+        for name in ("pyproject.toml", "docs", "README.md", "Makefile", "action.yml", ".ci"):
             (folder / name).symlink_to(ROOT / name)
 
     @contextmanager
