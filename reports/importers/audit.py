@@ -95,8 +95,11 @@ def _left_out(path: Path, without: str) -> set[str]:
     found = {word.strip().partition(":")[0].removesuffix("s") + "s" for word in without.split(",")}
     if is_urdf(path):
         return found | {"actuators"}  # of transmissions, which move nothing by themselves
-    if "tendons" in found and read(path)[0].tendon_armature.any():
+    model, _ = read(path)
+    if "tendons" in found and model.tendon_armature.any():
         found |= {"M", "energy"}
+    if ("limits" in found and model.tendon_limited.any()) or ("frictions" in found and model.tendon_frictionloss.any()):
+        found.add("tendons")  # whose numbers are one quantity
     return found | {"friction", "surfaces"} if "frictions" in found else found
 
 

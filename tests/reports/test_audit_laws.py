@@ -29,7 +29,7 @@ from crossbody.reports.importers.forms import Forms
 from crossbody.reports.importers.told import sarif, sentence
 
 PARTS = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
-<site name="s0" pos="0 0 2"/><body name="b1" pos="0 0 1"><joint name="j1" axis="0 1 0" damping="1 .2 .3"
+<site name="s0" pos="0 0 2"/><body name="b1" pos="0 0 1"><joint name="j1" range="-99 99" axis="0 1 0" damping="1 .2 .3"
  stiffness="4 .5 .6"/><geom name="g1" type="capsule" size=".05 .2" mass="1" friction="1.6 .01 .001"
  solref=".03 .8"/>
 <body name="b2" pos="0 .1 .5" euler="10 20 30"><joint name="j2" type="ball" damping=".4" stiffness="2"/>
@@ -39,7 +39,7 @@ PARTS = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" ty
 <site name="s1" pos="0 0 .1"/></body></body></body></worldbody>
 <contact><exclude body1="b1" body2="b3"/></contact>
 <tendon><fixed name="t1" stiffness="3"><joint joint="j1" coef="2"/><joint joint="j3" coef="1"/></fixed>
-<spatial name="t2" damping="2" springlength=".1"><site site="s0"/><site site="s1"/></spatial></tendon>
+<spatial name="t2" range="0 9" damping="2" springlength=".1"><site site="s0"/><site site="s1"/></spatial></tendon>
 <equality><connect name="e1" body1="b3" body2="b1" anchor="0 0 .1"/><weld name="e2" body1="b3" relpose="0 0 1 1 0 0 0"/>
 <joint name="e3" joint1="j1" joint2="j3" polycoef=".1 2 0 0 0"/></equality>
 <actuator><motor name="m1" joint="j1" gear="3"/><motor name="m2" joint="j2" gear="1 2 3"/>
@@ -67,6 +67,8 @@ CHANGES = [
     ("effort", '"-3 4"', '"-3 5"'), ("surfaces", "1.6 .01", "1.7 .01"),
     ("surfaces", 'name="g1"', 'name="g1" condim="6"'),
     ("surfaces", 'name="g4"', 'name="g4" margin=".01"'), ("softness", '".03 .8"', '".03 .9"'),
+    ("softness", 'name="j1" range', 'name="j1" solreflimit=".03 1" range'),
+    ("softness", 'name="t2"', 'name="t2" solreflimit=".03 1"'),
     ("softness", 'name="floor"', 'name="floor" solmix="2"'), ("softness", 'name="e3"', 'name="e3" solref=".03 1"'),
     ("softness", "<worldbody>", '<option timestep=".02"/><worldbody>'), ("keyframes", 'qpos=".1', 'qpos=".11'),
     ("keyframes", '".2 0 1 0 0 .3"', '".2 0 0 1 0 .3"'),
@@ -84,7 +86,7 @@ def test_our_tree_and_mujoco_agree_on_everything_that_is_compared(tmp_path: Path
     """Forces of actuators, lengths of tendons, ends of loops, boxes of shapes and pairs: computed by either alone."""
     told = rows_of(tmp_path / "parts.xml", "mujoco", PARTS, PARTS)
     assert set(told.values()) <= {OK, NONE}, told
-    assert {key for key, verdict in told.items() if verdict == NONE} == {"armature", "limits", "friction"}
+    assert {key for key, verdict in told.items() if verdict == NONE} == {"armature", "friction"}
 
 
 @pytest.mark.parametrize(
@@ -94,9 +96,8 @@ def test_our_tree_and_mujoco_agree_on_everything_that_is_compared(tmp_path: Path
 def test_what_is_left_out_is_held_against_nobody(without: str, tmp_path: Path) -> None:
     """MuJoCo reads the whole file all the same, and nothing of it is called wrong."""
     path, armature = tmp_path / "parts.xml", "tendon" in without
-    path.write_text(
-        PARTS.replace('name="t1"', 'name="t1" armature=".1" frictionloss=".2"' if armature else 'name="t1"')
-    )
+    more = 'name="t1" frictionloss=".2"' + ' armature=".1"' * armature
+    path.write_text(PARTS.replace('name="t1"', more))
     [(_, _, found)] = audited(path, ["mujoco"], without, seconds=60.0)
     assert {row.verdict for row in found} <= {OK, NONE}, found
     assert {"M", "energy"}.isdisjoint(row.quantity for row in found) == armature
