@@ -14,6 +14,7 @@ from random_scenes import random_scene, random_state, with_own_laws
 from crossbody.cases import Mode
 from crossbody.cases import load as load_case
 from crossbody.cases.files.case import case_of
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load
@@ -124,3 +125,20 @@ def test_an_audit_tells_the_law_of_every_row_in_its_place(seed: int) -> None:
     told = load("mujoco").prepare(case, "matched").audit()["constants"]
     for name, wanted in (("a0", case.law.a0), ("a1", case.law.a1)):
         np.testing.assert_allclose(told[name], wanted, rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_recorded_gaps_are_those_of_the_shapes_wherever_their_body_has_its_weight(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    com, place, spin = rng.uniform(-0.2, 0.2, 3), rng.uniform(-0.2, 0.2, 3), rng.normal(size=6)
+    scene = Scene(
+        bodies=(Body(name="thing", mass=1.0, com=com, inertia=(0.02, 0.03, 0.04, 0.0, 0.0, 0.0)),),
+        joints=(Joint(name="thing", body="thing", type="free"),),
+        shapes=(Shape(name="floor", type="plane"),
+                Shape(name="knob", body="thing", size=(0.05, 0.0, 0.0), position=place)),
+        pairs=(Pair(name="below", first="floor", second="knob"),),
+    )  # fmt: skip
+    case = case_of(scene, q0=[0.0, 0.0, 0.6, 1.0, 0.0, 0.0, 0.0], v0=spin, t_end=0.3)
+    run = load("mujoco").prepare(case).run()
+    rotation = matrices(run.q[:, 3:])
+    assert run.gap[:, 0] == pytest.approx(run.q[:, 2] + (rotation @ place)[:, 2] - 0.05, abs=1e-12)
