@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Mode, Outcome, OutputError, Tier, Trajectory
 from crossbody.reports.bench import against as bench_against
-from crossbody.reports.bench import scenes
+from crossbody.reports.bench import measure, scenes
 from crossbody.reports.bench.errors import errors, hermite
 from crossbody.reports.bench.headline import REFERENCE, headline
 from crossbody.reports.bench.ladder import Effort, Ladder
@@ -449,3 +449,23 @@ def test_a_ladder_ends_where_the_engine_admits_no_finer_setting() -> None:
     case = cases.load("bouncing_ball", "linear", t_end=0.1)
     settings = [setting for _, setting, _ in Ladder(case, Pick(engine="exudyn", profile="matched"), Effort())]
     assert settings[-1] == 1e-12
+
+
+def test_what_was_ended_or_skipped_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what cannot run the case does not keep the others from it."""
+    case, asked = cases.load("bouncing_ball", "linear"), list[str]()
+
+    def climbed(case: cases.Case, pick: Pick, *_: object) -> list[str]:
+        asked.append(pick.engine)
+        if pick.engine == "unable":
+            raise cases.CaseUnsupported("It cannot.")
+        return [pick.engine]
+
+    lost = f"{case.label}: ended:"
+    monkeypatch.setattr(measure.watch, "lost", lambda label: "It was ended." if label.startswith(lost) else "")
+    monkeypatch.setattr(measure, "_climbed", climbed)
+    monkeypatch.setattr(measure, "of_case", lambda pick, case: pick)
+    named = ("one", "ended", "unable", "skipped", "two")
+    picks = [Pick(engine=name, profile="p", skipped="It is not there." * (name == "skipped")) for name in named]
+    assert list(measure._rungs(case, picks, Effort(), lambda _: None, 1.0)) == ["one", "two"]
+    assert asked == ["one", "unable", "two"]
