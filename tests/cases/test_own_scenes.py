@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from click.testing import CliRunner
 
 from crossbody import cases, engines
 from crossbody.cases import Case, InvalidValue, SceneError
-from crossbody.cases.scene import Body, Joint, RowLaw, Scene
+from crossbody.cases.scene import Actuator, Body, Joint, RowLaw, Scene
 from crossbody.reports import suites
 from crossbody.reports.cli import cli
 from crossbody.reports.suites.axis import Levels, Linear
@@ -113,3 +114,15 @@ def test_a_cubic_term_is_followed_by_every_engine_with_the_law() -> None:
     found = ends(1e7, ("reference", "compiled"), ("mujoco", "matched"), ("pinocchio", "law"))
     assert found == pytest.approx([found[0]] * 3, abs=1e-5)
     assert ends(0.0, ("reference", "compiled"))[0] != pytest.approx(found[0], abs=1e-3)
+
+
+@pytest.mark.parametrize("time_constant", [-1.0, 0.0, math.inf, 1e-3, 1e3])
+@pytest.mark.parametrize("activation", ["", "integrator", "filter"])
+def test_a_filter_alone_has_a_time_constant(activation: str, time_constant: float) -> None:
+    given = {"name": "motor", "joint": "hinge", "activation": activation, "time_constant": time_constant}
+    finite = 0.0 < time_constant < math.inf
+    if finite == (activation == "filter"):
+        assert Actuator(**given).time_constant == time_constant
+    else:
+        with pytest.raises(SceneError, match="a filter alone has one, above 0 s"):
+            Actuator(**given)

@@ -20,6 +20,7 @@ from crossbody.reports.cli import main
 from crossbody.reports.commands import replay as command
 from crossbody.reports.replay.comparison import verdicts
 from crossbody.reports.runs import watch
+from crossbody.reports.sections.identify import sections
 
 MODEL = ["--model", "double_pendulum", "--columns", "multiarm_double"]
 
@@ -163,6 +164,8 @@ def test_a_fit_that_is_worse_where_it_was_not_fitted_is_outside(
     assert re.search(r"outside: reference:compiled held_out_worse is [\d.e+]+ %", said)
     held = json.loads((out / "held_out.json").read_text(encoding="utf-8"))["rows"]
     assert [row["verdict"] for row in held] == ["outside", "not judged", "not judged"]
+    row = sections(out)[0].tables[0].rows[0]
+    assert row["half"] == pytest.approx((row["high"] - row["low"]) / 2.0)
     assert f"rmse grew from {held[0]['held_before']:.4g} to {held[0]['held_after']:.4g}:" in said
     assert code(*asked, "--limit", "held_out_worse=1e9", "--quiet") == 0
     assert code(*asked, "--hold", "0", "--json") == 0

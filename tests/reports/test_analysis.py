@@ -11,7 +11,8 @@ from crossbody import cases
 from crossbody.cases import CaseUnsupported, InvalidValue, Outcome, SceneError, UnknownName
 from crossbody.cases.mechanisms.maze import closed_forms as maze_forms
 from crossbody.reference import delta, simulate
-from crossbody.reference.delta.scene import robot_of
+from crossbody.reference.delta.loop import closed_loop
+from crossbody.reference.delta.scene import controller_of, robot_of
 from crossbody.reference.linear import (
     LinearModel,
     controllable,
@@ -395,3 +396,14 @@ def test_a_page_of_places_without_any_model_says_why(tmp_path):
     page = (out / "index.html").read_text()
     assert "cannot be shown" not in page
     assert "indeterminate" in page
+
+
+def test_a_controlled_delta_is_linearised_where_it_is_asked_for() -> None:
+    case, at = cases.load("delta_tracking", "circle"), {"x": 0.08, "y": -0.05, "z": 0.62}
+    (there,) = (place for place in analyse.places(case, at) if place.controlled)
+    robot = robot_of(case.parameters)
+    q = delta.inverse(robot, list(at.values()))
+    wanted = closed_loop(robot, q, controller_of(case.parameters)).poles()
+    here = closed_loop(robot, case.q0, controller_of(case.parameters)).poles()
+    np.testing.assert_allclose(there.model.poles(), wanted, atol=1e-9)
+    assert np.abs(np.sort_complex(wanted) - np.sort_complex(here)).max() > 1e-4

@@ -6,6 +6,7 @@ import json
 import re
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import mujoco
@@ -21,7 +22,7 @@ from crossbody.engines import importers
 from crossbody.engines.importers.beside.conventions import rotation
 from crossbody.engines.importers.beside.process import tried
 from crossbody.engines.importers.beside.solids import bounds
-from crossbody.reports.importers.audit import audited, opened
+from crossbody.reports.importers.audit import _answered, audited, opened
 from crossbody.reports.importers.causes import advice, explained, parts, uses
 from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WORDS, WRONG, Said, rows
 from crossbody.reports.importers.declared import excused
@@ -293,6 +294,18 @@ def test_a_version_that_was_not_tried_is_told() -> None:
     assert "was tried with 0.1 to 0.2" in tried(Module)
     Module.TRIED = ("0.1", "99.0")
     assert tried(Module) == ""
+
+
+def test_what_is_to_be_said_of_a_readers_version_is_kept_beside_its_rows(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    found = opened(path)
+    answer = found.wanted | {"told": [], "strange": "It was tried with others."}
+    with Forms(path, lambda form: opened(form, "", found.job)) as forms:
+        reading: Any = SimpleNamespace(name="fake", answer=lambda job: answer)
+        [(_, _, told)] = _answered(found, [reading], set(), forms)
+    assert {row.verdict for row in told} <= {OK, NONE}
+    assert found.strange == {"fake": "It was tried with others."}
 
 
 def test_a_file_with_a_strange_name_is_told_in_print(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
