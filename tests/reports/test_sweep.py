@@ -166,6 +166,14 @@ def test_another_version_and_foreign_folders_are_not_touched(whole: Path, tmp_pa
     assert not (tmp_path / "none").exists()
 
 
+def test_a_folder_without_a_sweep_has_none_to_continue(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "own").write_text("mine")
+    for out in (tmp_path, tmp_path / "none"):
+        assert call("stress", "damping", "--resume", "--out", str(out)) == 2
+        assert f"{out} contains no sweep to continue" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["own"]
+
+
 def balls(runs: int, **changed: Any) -> list[Spec]:
     family = Family(case="bouncing_ball", variant="linear", axes={"a0": Log(1e2, 1e6)}, fixed={"t_end": 0.5})
     picks = plan_picks()
