@@ -312,3 +312,20 @@ def test_as_many_collisions_as_an_instant_may_have_are_no_cycle_where_each_has_i
     run = simulate(bouncing, [0.001], [0.0], 32.0, solver=solver, samples=[0.0])
     assert run.outcome.ok, run.message
     assert len(run.events) > 2 * 1064
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_interval_holds_an_event_if_no_function_is_open_and_not_if_one_stays_above(seed: int) -> None:
+    x = np.linspace(0.0, 1.0, NODES)
+    ways = {
+        enclosure.ABOVE: 1.0 + x, enclosure.BELOW: -1.0 - x, enclosure.FALLS: 0.4 - x,
+        enclosure.MIXED: np.cos(2.0 * np.pi * x),
+    }  # fmt: skip
+    lies = np.random.default_rng(seed).permutation(list(ways)[seed % 2 :])
+    row = np.zeros(enclosure.BESIDE + NODES)
+    for j, way in enumerate(lies.tolist()):
+        row[j * NODES : (j + 1) * NODES] = ways[way]
+    for count in range(1, len(lies) + 1):
+        seen = set(lies[:count].tolist())
+        wanted = enclosure.HALVE if enclosure.MIXED in seen else enclosure.HERE
+        assert enclosure.judge.py_func(row, count) == (enclosure.NOWHERE if enclosure.ABOVE in seen else wanted)

@@ -165,8 +165,18 @@ def test_poses_out_of_reach_and_singular_ones_are_told():
     for signal in (found.u, found.lam, found.basis, found.A, found.poles):
         assert np.isnan(signal[0]).all()
         assert np.isfinite(signal[1]).all()
-    with pytest.raises(SceneError, match="3 inputs"):
-        poses(delta.system(robot), [q], [0, 1])
+    for hold in ([0, 1], [0, 1, 1], [0, 1, -1], [0, 1, 6]):
+        with pytest.raises(SceneError, match="3 inputs"):
+            poses(delta.system(robot), [q], hold)
+
+
+def test_derivatives_that_are_no_numbers_are_told() -> None:
+    system, q = delta.system(delta.LIGHT), delta.inverse(delta.LIGHT, (0.0, 0.0, 0.6))
+    found = tangents(system, [q, q], [np.zeros(9), np.full(9, 1e200)])
+    assert found.well_posed.tolist() == [True, False]
+    for whole in (found.vd, found.lam, found.vd_x, found.vd_u, found.lam_x, found.lam_u):
+        assert np.isfinite(whole[0]).all()
+        assert np.isnan(whole[1]).all()
 
 
 def test_the_linearised_loop_has_the_characteristic_coefficients():
