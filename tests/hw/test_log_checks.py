@@ -181,6 +181,17 @@ def test_a_saturated_channel_is_found_at_its_first_run(at: list[int]) -> None:
     assert x[row - 1] > -1.5 < x[row + count]
 
 
+@STEADY
+@given(cuts, st.sampled_from([-1.0, 1.0]))
+def test_of_saturations_that_last_as_long_the_first_is_told(at: list[int], sign: float) -> None:
+    k = np.arange(300)
+    x = sign * np.clip(2.0 * np.sin(0.05 * np.pi * k + 0.1), -5.0, 1.0)
+    [(name, row, count)] = told(blocks(ValueCheck("x", "N"), at, k * STEP, x))
+    stays = np.flatnonzero(x == sign)
+    assert (name, row) == ("saturated", stays[0])
+    assert count == np.flatnonzero(np.diff(stays) > 1)[0] + 1
+
+
 @pytest.mark.parametrize("rest", [np.zeros(300), (np.arange(300) > 150).astype(float)])
 def test_a_touch_sensor_may_rest_and_press(rest: np.ndarray) -> None:
     pressed = rest.copy()

@@ -27,6 +27,7 @@ from crossbody.reports.importers.causes import advice, explained, parts, uses
 from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WORDS, WRONG, Said, rows
 from crossbody.reports.importers.declared import excused
 from crossbody.reports.importers.forms import Forms
+from crossbody.reports.importers.motion import inertia
 from crossbody.reports.importers.told import sarif, sentence
 
 PARTS = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" type="plane" size="1 1 1"/>
@@ -548,3 +549,17 @@ def test_a_robot_far_away_is_no_other_robot(far: float, tmp_path: Path) -> None:
     assert told["inertia"] == OK
     other = text.replace('size=".1 .2" mass="1"', 'size=".1 .2" mass="1.001"')
     assert rows_of(tmp_path / "far.xml", "mujoco", text, other)["inertia"] == WRONG
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_how_far_inertias_are_apart_depends_on_no_unit(seed: int) -> None:
+    """In other units of length and mass every number is another, and all gaps are the same."""
+    rng = np.random.default_rng(seed)
+    mine, theirs = (
+        {name: np.append(rng.uniform(0.5, 2.0, 4), rng.uniform(1.0, 2.0, 6)) for name in "ab"} for _ in "12"
+    )
+    for length, mass in ((1.0, 1000.0), (1e3, 1.0), (1e-2, 7.0)):
+        units = mass * np.repeat([1.0, length / mass, length**2], (1, 3, 6))
+        other = [{name: numbers * units for name, numbers in side.items()} for side in (mine, theirs)]
+        for one, scaled in zip(inertia(mine, theirs, 0.0), inertia(*other, 0.0), strict=True):
+            assert (scaled.where, scaled.size) == (one.where, pytest.approx(one.size, rel=1e-9))
