@@ -95,6 +95,8 @@ def _left_out(path: Path, without: str) -> set[str]:
     found = {word.strip().partition(":")[0].removesuffix("s") + "s" for word in without.split(",")}
     if is_urdf(path):
         return found | {"actuators"}  # of transmissions, which move nothing by themselves
+    if not found & {"frictions", "limits", "tendons"}:
+        return found
     model, _ = read(path)
     if "tendons" in found and model.tendon_armature.any():
         found |= {"M", "energy"}
