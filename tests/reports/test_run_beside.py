@@ -8,11 +8,17 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from places import STUCK
 
+from crossbody import cases
+from crossbody.reports.commands import run as command
 from crossbody.reports.runs import watch
 
 BALLS = """from crossbody.cases.library.bouncing_ball import PARAMETERS, build
@@ -72,3 +78,21 @@ def alive(process: int) -> bool:
         return "Z" not in Path(f"/proc/{process}/stat").read_text().split()[2]
     except (ProcessLookupError, FileNotFoundError):
         return False
+
+
+def test_the_missing_cases_run_the_largest_first_and_each_is_told_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("newtons_cradle", "bouncing_ball", "bouncing_ball", "red_body")
+    shown, done, some = list[str](), list[int](), [cases.load(name) for name in names]
+    there: Any = SimpleNamespace(has=lambda name: name == command.key(1, some[1]))
+
+    def beside(todo: Sequence[Callable[[], int]], at_once: int, tell: Callable[[int], None]) -> int:
+        for k, run in enumerate(todo):
+            tell(k)
+            run()
+        return 7
+
+    monkeypatch.setattr(watch, "beside", beside)
+    monkeypatch.setattr(command, "progress", lambda total: nullcontext(shown.append))
+    assert command._beside(some, there, lambda i: done.append(i) or 0, 2) == 1
+    assert done == [3, 0, 2]
+    assert shown == [some[i].label for i in done]
