@@ -78,7 +78,7 @@ def multipliers(
         held = G[np.ix_(S, N)] @ turn
         found[S] = _inverse(G[np.ix_(S, S)] - held @ G[np.ix_(N, S)]) @ (b[S] - held @ b[N])
     found[N] = turn @ (b[N] - G[np.ix_(N, S)] @ found[S])
-    moving: Floats = (_inverse(G) @ G) * size / size[:, None]
+    moving: Floats = ((_inverse(G) if len(S) else turn) @ G) * size / size[:, None]
     return found / size, moving
 
 

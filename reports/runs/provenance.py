@@ -40,7 +40,7 @@ def provenance(command: str, **more: Any) -> dict[str, Any]:
         "git": _commit(),
         "python": sys.version.split()[0],
         "versions": _versions(),
-        "machine": platform.platform(),
+        "machine": _machine(),
         "cpu": _cpu(),
         "cpus": os.cpu_count(),
         "threads": {k: v for k, v in os.environ.items() if k.endswith("_NUM_THREADS")},
@@ -84,6 +84,11 @@ def _commit() -> str:
         return git("rev-parse", "HEAD") + (" with changes" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return ""
+
+
+def _machine() -> str:
+    """System, release, processor and C library; `platform.platform` asks another process for the processor."""
+    return "-".join(filter(None, (platform.system(), platform.release(), platform.machine(), *platform.libc_ver())))
 
 
 def _cpu() -> str:
