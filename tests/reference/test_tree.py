@@ -98,9 +98,9 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     w = np.zeros(table.scratch)
     still = np.zeros(len(scene.inputs))
     mechanism.dynamics(0.0, q, v, still, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
-    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
+    mechanism.row_kernels(True)["rows"](0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
-    mechanism.gaps(0.0, q + 1j * step * rates(scene, q, v), v.astype(complex), table.p.astype(complex), *moved)
+    mechanism.row_kernels(True)["gaps"](0.0, q + 1j * step * rates(scene, q, v), v.astype(complex), table.p.astype(complex), *moved)
     assert close(moved[0].real, h)
     assert close(moved[0].imag / step, H @ v)
     assert close(moved[1].imag / step, Hdv)
