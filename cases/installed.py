@@ -21,6 +21,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import re
 import sys
 import tomllib
 import traceback
@@ -70,6 +71,19 @@ def _entry_points(group: str) -> Mapping[str, str]:
     from importlib.metadata import entry_points  # reads what is installed: once a process and group
 
     return {point.name: point.module for point in entry_points(group=group)}
+
+
+def version(name: str) -> str:
+    """Return the version of a distribution, which `importlib.metadata.version` does by parsing its whole README.
+
+    Raises:
+        PackageNotFoundError: if it is not installed.
+    """
+    from importlib.metadata import distribution
+
+    found = distribution(name)
+    stated = re.search(r"^Version:\s*(\S+)", found.read_text("METADATA") or "", re.MULTILINE)
+    return stated[1] if stated else found.version
 
 
 def _groups(module: ModuleType) -> list[str]:
