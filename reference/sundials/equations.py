@@ -29,9 +29,10 @@ DEPENDENT = 1e-13  # ratio of singular values of the scaled rows below which the
 def _solved(matrix: Floats, right: Floats) -> Floats | None:
     """Return the solution of linear equations; None where the matrix is singular."""
     try:
-        return np.linalg.solve(matrix, right)
+        found: Floats = np.linalg.solve(matrix, right).astype(np.float64, copy=False)
     except np.linalg.LinAlgError:
         return None
+    return found
 
 
 class Ended(Exception):  # noqa: N818 - an end, not an error: it is caught where the run is driven

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +57,7 @@ def least_distance(G: Floats, h: Floats) -> tuple[Floats, Floats] | None:
     return -rest[:-1] / rest[-1] * size, -found / rest[-1] * size
 
 
-def _pivoted(A: Floats, mode: str) -> Any:
+def _pivoted(A: Floats, mode: Literal["r", "economic"]) -> Any:
     """Return a QR decomposition with pivoting; its import takes .2 s, which rows that share no load do without."""
     from scipy.linalg import qr
 
