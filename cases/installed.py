@@ -68,9 +68,14 @@ def modules(group: str) -> Mapping[str, str]:
 
 @cache
 def _entry_points(group: str) -> Mapping[str, str]:
-    from importlib.metadata import entry_points  # reads what is installed: once a process and group
+    return {point.name: point.module for point in _every_entry_point().select(group=group)}
 
-    return {point.name: point.module for point in entry_points(group=group)}
+
+@cache
+def _every_entry_point() -> Any:
+    from importlib.metadata import entry_points  # reads what is installed: once a process
+
+    return entry_points()
 
 
 def version(name: str) -> str:

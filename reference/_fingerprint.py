@@ -78,8 +78,11 @@ def _reads(code: CodeType) -> _Reads:
     opcodes, arguments = code.co_code[::2], bytearray(code.co_code[1::2])
 
     def loaded(what: re.Pattern[bytes]) -> Iterator[int]:
-        for found in what.finditer(opcodes):
-            yield sum(arguments[at] << 8 * k for k, at in enumerate(_bytes_of(opcodes, found.start())))
+        for at in (found.start() for found in what.finditer(opcodes)):
+            if at and opcodes[at - 1] == dis.EXTENDED_ARG:
+                yield sum(arguments[byte] << 8 * k for k, byte in enumerate(_bytes_of(opcodes, at)))
+            else:
+                yield arguments[at]
 
     constants = [code.co_consts[number] for number in loaded(_CONSTANTS)]
     found = {code.co_names[number >> shift] for what, shift in _GLOBALS.items() for number in loaded(what)}
@@ -149,15 +152,12 @@ class _Walk:
         kind = type(value)
         if kind in _PLAIN:
             self.put(kind.__name__, repr(value))
+        elif isinstance(value, Dispatcher):
+            self.compiled(value)
         elif isinstance(value, (np.ndarray, np.generic)):
             self.array(value)
         elif isinstance(value, (tuple, list, set, frozenset, Mapping)):
             self.collection(value, names)
-        elif isinstance(value, Dispatcher):
-            self.put("compiled", repr(sorted(value.targetoptions.items(), key=lambda item: item[0])))
-            if changed(value):
-                raise Unreadable(f"{value.__qualname__} was compiled before what it reads changed")
-            self.function(value.py_func)
         elif isinstance(value, _Intrinsic):
             self.put("intrinsic")
             self.function(value._defn)
@@ -181,6 +181,15 @@ class _Walk:
             self.cls(value, names)
         else:
             raise Unreadable(f"{value!r} of {kind.__module__}.{kind.__qualname__}")
+
+    def compiled(self, dispatcher: Dispatcher) -> None:
+        """Add a compiled function: how it is compiled, and what it is in Python."""
+        if not self.first(id(dispatcher), dispatcher):
+            return
+        self.put("compiled", repr(sorted(dispatcher.targetoptions.items(), key=lambda item: item[0])))
+        if changed(dispatcher):
+            raise Unreadable(f"{dispatcher.__qualname__} was compiled before what it reads changed")
+        self.function(dispatcher.py_func)
 
     def array(self, value: Any) -> None:
         """Add an array or scalar of numpy: type, layout and content."""
