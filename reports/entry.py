@@ -9,7 +9,7 @@ import sys
 from types import FrameType
 
 FIRST, FRESH = 200_000, 20_000
-"""Objects after which garbage is looked for at first, and from then on: imports make a hundred thousand, all to stay."""
+"""Objects after which garbage is looked for at first, and later on: imports make a hundred thousand, all to stay."""
 
 
 def main() -> None:
