@@ -21,6 +21,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import re
 import sys
 import tomllib
 import traceback
@@ -67,9 +68,27 @@ def modules(group: str) -> Mapping[str, str]:
 
 @cache
 def _entry_points(group: str) -> Mapping[str, str]:
-    from importlib.metadata import entry_points  # reads what is installed: once a process and group
+    return {point.name: point.module for point in _every_entry_point().select(group=group)}
 
-    return {point.name: point.module for point in entry_points(group=group)}
+
+@cache
+def _every_entry_point() -> Any:
+    from importlib.metadata import entry_points  # reads what is installed: once a process
+
+    return entry_points()
+
+
+def version(name: str) -> str:
+    """Return the version of a distribution, which `importlib.metadata.version` does by parsing its whole README.
+
+    Raises:
+        PackageNotFoundError: if it is not installed.
+    """
+    from importlib.metadata import distribution
+
+    found = distribution(name)
+    stated = re.search(r"^Version:\s*(\S+)", found.read_text("METADATA") or "", re.MULTILINE)
+    return stated[1] if stated else found.version
 
 
 def _groups(module: ModuleType) -> list[str]:

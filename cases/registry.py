@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import ast
 import importlib
+import os
 import pkgutil
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib.machinery import PathFinder
 from pathlib import Path
 from types import ModuleType
@@ -38,7 +40,7 @@ class Registry:
 
     def own(self) -> tuple[str, ...]:
         """Return the names of the plug-ins in the folder, sorted; nothing is imported."""
-        found = (module.name for module in pkgutil.iter_modules(self._path()))
+        found = {name for folder in self._path() for name in _listed(folder, _changed(folder))}
         return tuple(sorted(name for name in found if not name.startswith("_") and name not in self.hidden))
 
     def names(self) -> tuple[str, ...]:
@@ -73,3 +75,17 @@ class Registry:
 
     def _installed(self) -> Mapping[str, str]:
         return installed.modules(self.group or self.package)
+
+
+@cache
+def _listed(folder: str, _changed: int) -> tuple[str, ...]:
+    """Return the modules in a folder; it is read anew when it has changed."""
+    return tuple(module.name for module in pkgutil.iter_modules([folder]))
+
+
+def _changed(folder: str) -> int:
+    """Return when a folder changed last, ns."""
+    try:
+        return os.stat(folder).st_mtime_ns
+    except OSError:  # inside an archive
+        return 0

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, SceneError, Trajectory
+from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, SceneError, Trajectory, installed
 from crossbody.cases.arrays import is_number
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
@@ -120,7 +119,7 @@ class Reference(Engine):
         "ida": "the DAE in (q, v, lam) by SUNDIALS IDA",
         "cvode": "the reduced equations in (q, v) by SUNDIALS CVODE",
     }
-    versions: Mapping[str, str] = {name: version(name) for name in ("numba", "numpy", "scikit-sundae")}
+    versions: Mapping[str, str] = {name: installed.version(name) for name in ("numba", "numpy", "scikit-sundae")}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:

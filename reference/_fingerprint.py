@@ -13,6 +13,7 @@ from __future__ import annotations
 import dis
 import enum
 import hashlib
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, lru_cache
@@ -54,35 +55,52 @@ class _Reads(NamedTuple):
     names: frozenset[str]
 
 
-_CONSTANT = frozenset(dis.hasconst)
-_GLOBAL = {dis.opmap["LOAD_GLOBAL"]: 1, dis.opmap["LOAD_NAME"]: 0}
+def _any_of(*opcodes: int) -> re.Pattern[bytes]:
+    return re.compile(b"[" + re.escape(bytes(opcodes)) + b"]")
+
+
+_CONSTANTS = _any_of(*(opcode for opcode in dis.hasconst if opcode < 256))
+_GLOBALS = {_any_of(dis.opmap["LOAD_GLOBAL"]): 1, _any_of(dis.opmap["LOAD_NAME"]): 0}
 """What loads a global by its name, and by how many bits the number of the name is shifted."""
 
 
-def _steps(code: CodeType) -> Iterator[tuple[int, int]]:
-    """Yield opcodes with their arguments, as `dis` does in ten times the time."""
-    argument, data = 0, code.co_code
-    for opcode, low in zip(data[::2], data[1::2], strict=True):
-        argument = argument << 8 | low
-        if opcode != dis.EXTENDED_ARG:
-            yield opcode, argument
-            argument = 0
+def _bytes_of(opcodes: bytes, at: int) -> Iterator[int]:
+    """Yield where the bytes of an instruction's argument stand, the lowest first."""
+    yield at
+    while at and opcodes[at - 1] == dis.EXTENDED_ARG:
+        at -= 1
+        yield at
 
 
 @lru_cache(maxsize=8192)
 def _reads(code: CodeType) -> _Reads:
     """Take code apart: its steps and constants in the order of use, the globals that it loads, and all its names."""
-    steps = list(_steps(code))
-    constants = [code.co_consts[argument] for opcode, argument in steps if opcode in _CONSTANT]
+    opcodes, arguments = code.co_code[::2], bytearray(code.co_code[1::2])
+
+    def loaded(what: re.Pattern[bytes]) -> Iterator[int]:
+        for at in (found.start() for found in what.finditer(opcodes)):
+            if at and opcodes[at - 1] == dis.EXTENDED_ARG:
+                yield sum(arguments[byte] << 8 * k for k, byte in enumerate(_bytes_of(opcodes, at)))
+            else:
+                yield arguments[at]
+
+    constants = [code.co_consts[number] for number in loaded(_CONSTANTS)]
+    found = {code.co_names[number >> shift] for what, shift in _GLOBALS.items() for number in loaded(what)}
     inner = [_reads(constant) for constant in constants if isinstance(constant, CodeType)]
     # A docstring stands first among the constants: what is loaded counts, not its number.
-    opcodes = [(opcode, None if opcode in _CONSTANT else argument) for opcode, argument in steps]
+    for constant in _CONSTANTS.finditer(opcodes):
+        for at in _bytes_of(opcodes, constant.start()):
+            arguments[at] = 0
     shape = (
-        opcodes, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars, code.co_argcount,
-        code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags, code.co_exceptiontable,
+        opcodes, bytes(arguments), code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars,
+        code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags, code.co_exceptiontable,
     )  # fmt: skip
-    parts = (repr(shape), *(_reads(value).parts if isinstance(value, CodeType) else value for value in constants))
-    found = {code.co_names[argument >> _GLOBAL[opcode]] for opcode, argument in steps if opcode in _GLOBAL}
+    told = [(k, value) for k, value in enumerate(constants) if type(value) in _PLAIN]
+    others = (value for value in constants if type(value) not in _PLAIN)
+    parts = (
+        repr((shape, told)),
+        *(_reads(value).parts if isinstance(value, CodeType) else value for value in others),
+    )
     return _Reads(
         parts,
         tuple(sorted(found.union(*(reads.globals for reads in inner)))),
@@ -134,15 +152,12 @@ class _Walk:
         kind = type(value)
         if kind in _PLAIN:
             self.put(kind.__name__, repr(value))
+        elif isinstance(value, Dispatcher):
+            self.compiled(value)
         elif isinstance(value, (np.ndarray, np.generic)):
             self.array(value)
         elif isinstance(value, (tuple, list, set, frozenset, Mapping)):
             self.collection(value, names)
-        elif isinstance(value, Dispatcher):
-            self.put("compiled", repr(sorted(value.targetoptions.items(), key=lambda item: item[0])))
-            if changed(value):
-                raise Unreadable(f"{value.__qualname__} was compiled before what it reads changed")
-            self.function(value.py_func)
         elif isinstance(value, _Intrinsic):
             self.put("intrinsic")
             self.function(value._defn)
@@ -166,6 +181,15 @@ class _Walk:
             self.cls(value, names)
         else:
             raise Unreadable(f"{value!r} of {kind.__module__}.{kind.__qualname__}")
+
+    def compiled(self, dispatcher: Dispatcher) -> None:
+        """Add a compiled function: how it is compiled, and what it is in Python."""
+        if not self.first(id(dispatcher), dispatcher):
+            return
+        self.put("compiled", repr(sorted(dispatcher.targetoptions.items(), key=lambda item: item[0])))
+        if changed(dispatcher):
+            raise Unreadable(f"{dispatcher.__qualname__} was compiled before what it reads changed")
+        self.function(dispatcher.py_func)
 
     def array(self, value: Any) -> None:
         """Add an array or scalar of numpy: type, layout and content."""

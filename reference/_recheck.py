@@ -144,7 +144,7 @@ class _Recheck:
         self.frozen = frozenset() if collisions == "resolved" else frozenset(np.flatnonzero(fast).tolist())
         self.near = _near(run, rtol)
         self.inputs_t, self.inputs_u = Options(t_end=1.0, inputs=inputs).schedule(system, played=True)
-        self.speed = np.abs([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)]).max(axis=0)
+        self.speed = np.abs(system.gaps_along(run.q, run.v)[1]).max(axis=0)
 
     def between(self) -> Iterator[Violation]:
         """What does not hold between the rows."""

@@ -422,6 +422,15 @@ class System:
         self.gaps(0.0, *self._state(q, v), np.array(self.p), h, hd)
         return h, hd
 
+    def gaps_along(self, q: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
+        """Gaps and their rates (m, nc) along a motion, at its positions (m, nq) and velocities (m, n)."""
+        q, v = (_finite(name, np.array(value, np.float64, order="C")) for name, value in (("q", q), ("v", v)))
+        q, p = np.ascontiguousarray(self.normalised("simulate.q", q)), np.array(self.p)
+        h, hd = np.zeros((len(q), self.nc)), np.zeros((len(q), self.nc))
+        for i in range(len(q)):
+            self.gaps(0.0, q[i], v[i], p, h[i], hd[i])
+        return h, hd
+
     @checked_arguments
     def check(self, q: ArrayLike, v: ArrayLike | None = None, *, states: int = 100, t_end: float = 1.0) -> None:
         """Check the kernels at a state and at random ones near it.
@@ -509,8 +518,7 @@ class System:
     def _copied(self, name: str, value: ArrayLike) -> Floats:
         at = name.startswith("q")
         array: Floats = np.array(frozen("simulate", name, value, (self.nq if at else self.n,)))
-        if not np.all(np.isfinite(array)):
-            raise SceneError(f"simulate.{name} is {array.tolist()}; it must be finite.")
+        _finite(name, array)
         return self.normalised(f"simulate.{name}", array) if at else array
 
     def _state(self, q: ArrayLike, v: ArrayLike | None) -> tuple[Floats, Floats]:
@@ -518,6 +526,12 @@ class System:
 
     def _input(self, u: ArrayLike | None) -> Floats:
         return np.array(frozen("simulate", "u", np.zeros(self.inputs) if u is None else u, (self.inputs,)))
+
+
+def _finite(name: str, array: Floats) -> Floats:
+    if not np.all(np.isfinite(array)):
+        raise SceneError(f"simulate.{name} is {array.tolist()}; it must be finite.")
+    return array
 
 
 def initial_modes(system: System, q: Floats | None = None, v: Floats | None = None) -> Bytes:

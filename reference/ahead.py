@@ -22,8 +22,8 @@ PIECES = {
 """Name -> what compiles it; the largest first. Each can be compiled in a process of its own."""
 
 
-BESIDE = ("integrator", "modes")
-"""What every run needs beside the kernels of its mechanism; one after the other they share much of their code."""
+BESIDE = ("integrator", "SUNDIALS", "modes")
+"""What runs need beside the kernels of their mechanism, in order: a run compiles the last itself, meanwhile."""
 _alone = False  # whether somebody else sees to the other pieces
 
 

@@ -19,6 +19,7 @@ from functools import cache, cached_property
 from typing import Any
 
 import llvmlite
+import llvmlite.binding as llvm
 import numba
 import numba.core.config as numba_config
 from numba.core import sigutils, types, typing
@@ -26,6 +27,7 @@ from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import Environment, lookup_environment
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import _nrt_python as _nrt
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
@@ -43,7 +45,7 @@ OURS = "crossbody.reference."
 ALLOCATES_NOTHING = ("crossbody.reference.core.", "crossbody.reference.sundials.compiled.")
 """The modules whose compiled functions make no arrays: numba refuses one that would."""
 
-FORMAT = "2"  # what `save_overload` writes; another number for every change of it
+FORMAT = "3"  # what `save_overload` writes; another number for every change of it
 
 
 def debugging() -> bool:
@@ -205,9 +207,10 @@ class _Overloads:
         data = store.read(key)
         if data is None:
             return None
-        rtsys.initialize(target_context)  # all that code which is read back needs of what a compiler sets up
         try:
-            return _rebuilt(target_context, *pickle.loads(data))
+            whole, *kept = pickle.loads(data)
+            _make_ready(target_context, whole)  # all that code needs of what a compiler sets up
+            return _rebuilt(target_context, *kept)
         except Exception as error:
             # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
             store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
@@ -220,10 +223,34 @@ class _Overloads:
             return
         library, description, environment, *rest, others = result._reduce()
         kept = library, description, _told(environment), *rest, [_told(one) for one in others]
-        store.write(self.key(self.content, sig), dumps(kept))
+        store.write(self.key(self.content, sig), dumps((_asks_for_more(result.library), *kept)))
 
     def flush(self) -> None:
         """Forget nothing: what is stale has another key."""
+
+
+_MEMORY = {name if name.startswith("_") else f"NRT_{name}": place for name, place in _nrt.c_helpers.items()}
+"""Functions in C that code with arrays calls, with their addresses."""
+
+
+def _asks_for_more(library: Any) -> bool:
+    """Whether code calls functions for memory that numba compiles: they are in what it calls, as a rule."""
+    called = (one.name for one in library._final_module.functions if one.is_declaration)
+    return any(name.lower().startswith(("nrt_", "_nrt_")) and name not in _MEMORY for name in called)
+
+
+def _make_ready(context: Any, whole: bool) -> None:
+    """Let code find what it calls for memory: numba's compiled functions, if need be, take longer than all else."""
+    if whole:
+        rtsys.initialize(context)
+    else:
+        _name_memory()
+
+
+@cache
+def _name_memory() -> None:
+    for name, place in _MEMORY.items():
+        llvm.add_symbol(name, place)
 
 
 def _told(environment: Environment) -> tuple[str, list[Any], str]:

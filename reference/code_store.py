@@ -144,7 +144,7 @@ class Store:
             with suppress(OSError):
                 os.utime(path)  # it is in use: not to be pruned
         start = len(MAGIC) + hashlib.sha256().digest_size
-        if data[:start] != MAGIC + _seal(name, data[start:]):
+        if data[:start] != MAGIC + _seal(name, memoryview(data)[start:]):
             self.drop(name, "was damaged")
             return None
         return data[start:]
@@ -248,6 +248,8 @@ def _prune_once(store: Store) -> None:
     store.prune()
 
 
-def _seal(name: str, data: bytes) -> bytes:
+def _seal(name: str, data: bytes | memoryview) -> bytes:
     """The digest of a name and what stands under it: a file under another's name is not believed."""
-    return hashlib.sha256(name.encode() + b"\0" + data).digest()
+    found = hashlib.sha256(name.encode() + b"\0")
+    found.update(data)
+    return found.digest()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from crossbody.reference.tree.pair_rows import gradient, touch
 from crossbody.reference.tree.points import point, pull
 
 REAL = 8  # bytes of a number that is not complex
+PAIRED = True  # whether shapes may meet; another value is seen by `without_pairs` alone
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
 
 
@@ -151,7 +154,6 @@ def _has_partner(p: Array, i: int, k: int) -> bool:
     return bool(first and across and p[one + pairs.PLACE].real == p[other + pairs.PLACE].real)
 
 
-@kernels.gaps
 def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
     """Of every row; where points or shapes of bodies are to meet their poses are computed first."""
     w = sweeps.posed(q, v, p) if p[layout.POSED].real > 0.0 else np.empty(0, dtype=q.dtype)
@@ -168,10 +170,10 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
             h[i], hd[i], _ = strings.string(p, i, w)
             if kind == layout.DRY_STRING:
                 h[i] = 0.0 * w[0]
-        elif kind == layout.CONTACT:
+        elif PAIRED and kind == layout.CONTACT:
             found = _contact(p, w, i)[1][0]
             h[i], hd[i] = found[0], found[1]
-        elif kind == layout.TANGENT:
+        elif PAIRED and kind == layout.TANGENT:
             at, x, way, other = _slip(p, w, i)
             h[i], hd[i] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[0]
             if i + 1 < len(h) and _has_partner(p, i, i + 1):
@@ -181,7 +183,6 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
             h[i], hd[i], _ = _row(q, v, p, i)
 
 
-@kernels.rows
 def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, H: Array, h: Array, Hdv: Array) -> None:
     """The active ones."""
     H[:na] = 0.0
@@ -201,11 +202,11 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
             if kind == layout.DRY_STRING:
                 h[j] = 0.0 * w[0]
             strings.string_columns(p, idx[j], w, H[j])
-        elif kind == layout.CONTACT:
+        elif PAIRED and kind == layout.CONTACT:
             at, (gap, n, place) = _contact(p, w, idx[j])
             h[j], Hdv[j] = gap[0], gap[2]
             gradient(p, w, at, n, place, H[j])
-        elif kind == layout.TANGENT:
+        elif PAIRED and kind == layout.TANGENT:
             at, x, way, other = _slip(p, w, idx[j])
             h[j], Hdv[j] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[1]
             slip.columns(p, w, at, x, way, H[j])
@@ -315,4 +316,21 @@ def velocity(t: float, q: Array, v: Array, p: Array, qd: Array) -> None:
             _turn(q, at, v, j, qd)
 
 
-KERNELS: dict[str, Any] = {"dynamics": dynamics, "gaps": gaps, "rows": rows, "energy": energy, "power": power}
+KERNELS: dict[str, Any] = {"dynamics": dynamics, "energy": energy, "power": power}
+"""Those of every scene; it has those of `row_kernels` beside them."""
+
+
+@cache
+def row_kernels(paired: bool) -> dict[str, Any]:
+    """Return the kernels of rows, of a scene whose shapes may meet or of another, which takes half as long to compile.
+
+    Args:
+        paired: whether rows of contacts are among them.
+    """
+    made = (gaps, rows) if paired else map(without_pairs, (gaps, rows))
+    return {one.__name__: getattr(kernels, one.__name__)(one) for one in made}
+
+
+def without_pairs(function: Any) -> Any:
+    """Return a function that reads False for PAIRED: what stands behind it is not compiled."""
+    return FunctionType(function.__code__, {**function.__globals__, "PAIRED": False})

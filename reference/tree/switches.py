@@ -5,6 +5,9 @@ Each is a variable that holds from one instant to the next: inside a step the ro
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
 
 from crossbody.reference import kernels
@@ -13,8 +16,10 @@ from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.tree import balls, kinks, layout, sweeps
 from crossbody.reference.tree import pair_slip as slip
+from crossbody.reference.tree.mechanism import without_pairs
 from crossbody.reference.tree.pair_rows import axis, cap, chosen, lowest, touch, turn, upside_down
 
+PAIRED = True  # as in `mechanism`
 FREE = 0  # a mode, as in crossbody.cases.Mode
 ASIDE = 1e-2  # rad, from where a load leans to the first point on which a cylinder stands
 
@@ -35,7 +40,6 @@ def _posed(q: Floats, v: Floats, p: Floats) -> Floats:
     return sweeps.posed(q, v, p) if p[layout.LYING] > 0.0 or p[layout.SPANNED] > 0.0 or kinks.held(p) else q
 
 
-@kernels.watch
 def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
     """Of every bound of a ball joint how far it is from half a turn, of pairs from lying otherwise, of kinks."""
     bends = int(p[layout.KINKS])
@@ -54,8 +58,8 @@ def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
         if int(p[o]) == layout.BALL_LIMIT:
             g[int(p[o + balls.WHICH])] = balls.to_half_a_turn(q, p, o)
             continue
-        o = _pair(p, i)
-        if o >= 0:
+        o = _pair(p, i) if PAIRED else -1
+        if PAIRED and o >= 0:
             k = int(p[o + pairs.LIES])
             g[k] = turn(p, w, o, int(p[int(p[layout.AT_SIDE]) + k]))
 
@@ -149,7 +153,6 @@ def _bend(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) ->
         kinks.choose(t, q, v, p, w, total, k, not anew)
 
 
-@kernels.switch
 def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -> int:
     """Choose sides and ways at the start, and change the one that has come to its end.
 
@@ -161,13 +164,20 @@ def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -
         return int(UNCHANGED if fired == TOUCHED else CHANGED)
     w = _posed(q, v, p)
     for i in range(int(p[layout.ROWS])):
-        o, pair = int(p[layout.AT_ROW]) + layout.ROW * i, _pair(p, i)
+        o, pair = int(p[layout.AT_ROW]) + layout.ROW * i, _pair(p, i) if PAIRED else -1
         if int(p[o]) == layout.BALL_LIMIT:
             k = int(p[o + balls.WHICH])
             if fired == START:
                 p[first + k] = -1.0 if q[int(p[o + balls.AT_Q])] < 0.0 else 1.0
             elif fired == k:
                 p[first + k] *= -1.0
-        elif pair >= 0 and fired in (START, int(p[pair + pairs.LIES])):
+        elif PAIRED and pair >= 0 and fired in (START, int(p[pair + pairs.LIES])):
             _lie(p, w, pair, i, mode)
     return int(CHANGED if fired >= 0 else UNCHANGED)
+
+
+@cache
+def switching_kernels(paired: bool) -> dict[str, Any]:
+    """Return the kernels of switches, of a scene whose shapes may meet or of another (`mechanism.row_kernels`)."""
+    made = (watch, switch) if paired else map(without_pairs, (watch, switch))
+    return {one.__name__: getattr(kernels, one.__name__)(one) for one in made}

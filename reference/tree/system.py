@@ -16,8 +16,9 @@ from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._redundant import ranked
 from crossbody.reference.kinds import Floats
-from crossbody.reference.tree import layout, switches
-from crossbody.reference.tree.mechanism import KERNELS, velocity
+from crossbody.reference.tree import layout
+from crossbody.reference.tree.mechanism import KERNELS, row_kernels, velocity
+from crossbody.reference.tree.switches import switching_kernels
 from crossbody.reference.tree.table import dof_parents, tabulate
 from crossbody.reference.tree.traced import compiled_sweeps
 
@@ -68,14 +69,13 @@ def system(
     Raises:
         SceneError: for a scene that the kernels cannot do, or a rank that the rows do not have.
     """
-    table = tabulate(scene)
+    table, paired = tabulate(scene), bool(contacts(scene))
     turning: dict[str, Any] = {}
     if table.quaternions:
         turning = {"velocity": velocity, "quaternions": table.quaternions}
     if table.sides or table.kinks:
         turning |= {
-            "watch": switches.watch,
-            "switch": switches.switch,
+            **switching_kernels(paired),
             "guards": table.sides + table.kinks,
             "discrete": np.zeros(table.sides + table.kinks),
             "latched": table.latched,
@@ -90,7 +90,7 @@ def system(
         a0=law.a0, a1=law.a1, a2=law.a2, b0=law.b0, b1=law.b1, unilateral=law.unilateral,
         **_friction(scene, len(law.a0)),
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
-        activations=activations(scene, act0) if scene.activated else None, **KERNELS,
+        activations=activations(scene, act0) if scene.activated else None, **KERNELS, **row_kernels(paired),
     )  # fmt: skip
     whole = System(**fields)
     if q0 is None or not scene.loops:

@@ -76,7 +76,7 @@ def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if not finite(run):
         return math.nan
     some = spread(run)
-    wanted = np.array([system.gap(q)[0] for q in run.q[some]])
+    wanted = system.gaps_along(run.q[some], 0.0 * run.v[some])[0]
     scale = max(float(np.max(np.abs(wanted))), ROUNDING * float(np.max(np.abs(run.q[some]))))
     off = float(np.max(np.abs(run.gap[some] - wanted)))
     return off / scale if scale else off

@@ -72,14 +72,20 @@ def multipliers(
     G = H @ inverse[:, 1:]
     size, first = _sizes(system, np.diag(G), rows)
     G, b = G / np.outer(size, size), -(H @ inverse[:, 0] + wanted) / size
-    found, N, S = np.zeros(len(rows)), np.flatnonzero(first), np.flatnonzero(~first)
-    turn = _inverse(G[np.ix_(N, N)])
-    if len(S):
-        held = G[np.ix_(S, N)] @ turn
-        found[S] = _inverse(G[np.ix_(S, S)] - held @ G[np.ix_(N, S)]) @ (b[S] - held @ b[N])
-    found[N] = turn @ (b[N] - G[np.ix_(N, S)] @ found[S])
-    moving: Floats = (_inverse(G) @ G) * size / size[:, None]
+    whole = _inverse(G)
+    found = whole @ b if first.all() else _one_after_the_other(G, b, first)
+    moving: Floats = (whole @ G) * size / size[:, None]
     return found / size, moving
+
+
+def _one_after_the_other(G: Floats, b: Floats, first: NDArray[np.bool_]) -> Floats:
+    """Return x with G x = b on the first rows, and on the others as near as that leaves."""
+    found, N, S = np.zeros(len(b)), np.flatnonzero(first), np.flatnonzero(~first)
+    turn = _inverse(G[np.ix_(N, N)])
+    held = G[np.ix_(S, N)] @ turn
+    found[S] = _inverse(G[np.ix_(S, S)] - held @ G[np.ix_(N, S)]) @ (b[S] - held @ b[N])
+    found[N] = turn @ (b[N] - G[np.ix_(N, S)] @ found[S])
+    return found
 
 
 def _sizes(system: System, own: Floats, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.bool_]]:

@@ -128,15 +128,19 @@ def policy(scripts: Sequence[str], single: bool) -> str:
     )
 
 
-def assets() -> dict[str, str]:
+def assets() -> dict[str, str | bytes]:
     """The files that all pages of a folder share, by name."""
-    return {SCRIPT: _script(), STYLE: _text("page.css"), PLOTLY: _text(PLOTLY)}
+    return {SCRIPT: _script(), STYLE: _text("page.css"), PLOTLY: _bytes(PLOTLY)}
 
 
 @cache
 def _text(name: str) -> str:
+    return _bytes(name).decode("utf-8")
+
+
+def _bytes(name: str) -> bytes:
     try:
-        return (TEMPLATES / name).read_text(encoding="utf-8")
+        return (TEMPLATES / name).read_bytes()
     except FileNotFoundError:
         raise OutputError(
             f"{TEMPLATES / name} is not there; installing crossbody (pip install) puts it there."

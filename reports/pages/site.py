@@ -5,7 +5,7 @@ They are made from files alone (tables and motions), never with an engine, and c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -112,7 +112,7 @@ def _unreadable(found: Results, error: BaseException) -> str:
     return f"{found.out} cannot be shown: a field of {files} or of a motion is not as expected ({what})."
 
 
-def _put(out: Path, files: dict[str, str]) -> None:
+def _put(out: Path, files: Mapping[str, str | bytes]) -> None:
     for name, text in files.items():
         try:
             replace_text(out / name, text)

@@ -166,12 +166,12 @@ def write(folder: Path, manifest: Manifest) -> None:
     replace_text(folder / MARKER, json.dumps(told, indent=1) + "\n")
 
 
-def replace_text(path: Path, text: str) -> None:
+def replace_text(path: Path, text: str | bytes) -> None:
     """Write one file of a folder of ours, whole or not at all; a link there is replaced, not followed."""
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(text.encode("utf-8") if isinstance(text, str) else text)
             os.fchmod(file.fileno(), 0o644)
         os.replace(name, path)
     except BaseException:

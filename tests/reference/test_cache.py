@@ -13,15 +13,17 @@ import textwrap
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
+import llvmlite.binding as llvm
 import numba.core.config as numba_config
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from numba.core import types
 
-from crossbody.reference import code_store, kernels
-from crossbody.reference.cache import Compiled
+from crossbody.reference import cache, code_store, kernels
+from crossbody.reference.cache import Compiled, compiled
 from crossbody.reference.code_store import CODE, LOCK, Store
 from crossbody.reports.cli import cli
 
@@ -110,6 +112,28 @@ CALLS = """
 """
 
 
+MAKES = """
+    import sys
+    import numpy as np
+    from numba.core import types
+    from numba.core.runtime import rtsys
+    from crossbody.reference.cache import compiled
+
+    def squares(x):
+        found = np.zeros((3, len(x)))
+        for k in range(3):
+            found[k] = x * x + k
+        return [row.sum() for row in found], found
+
+    signature = types.Tuple((types.List(types.float64), types.float64[:, ::1]))(types.float64[::1])
+    squares = compiled(squares, [signature])
+    begun = rtsys._init
+    for _ in range(1000):
+        sums, rows = squares(np.arange(4.0))
+    print(*sums, rows.sum(), sys.getrefcount(rows), sum(squares._cache_hits.values()), int(begun))
+"""
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     """An empty cache of this test's own."""
@@ -143,6 +167,29 @@ def test_code_that_was_read_back_is_taken_in_by_code_that_is_compiled(tmp_path):
     for more, told in (([], "21.0 0.0 0"), (["both"], "21.0 42.0 1"), (["both"], "21.0 42.0 1")):
         command = [sys.executable, str(tmp_path / "calls.py"), *more]
         assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() == told.split()
+
+
+def test_code_that_makes_arrays_needs_no_functions_compiled_for_memory_when_it_is_read_back(tmp_path):
+    (tmp_path / "makes.py").write_text(textwrap.dedent(MAKES))
+    for hits, begun in (("0", "1"), ("1", "0")):
+        done = subprocess.run([sys.executable, str(tmp_path / "makes.py")], capture_output=True, text=True, check=True)
+        assert done.stdout.split() == ["14.0", "18.0", "22.0", "54.0", "2", hits, begun]
+
+
+def test_code_that_calls_what_numba_compiles_for_memory_has_it_compiled(monkeypatch):
+    """Whatever a version of numba leaves outside: a name that nobody has would end the process."""
+    begun, library = [], compiled(_add, [types.float64(types.float64)]).overloads[(types.float64,)].library
+    monkeypatch.setattr(cache.rtsys, "initialize", begun.append)
+    assert not cache._asks_for_more(library)
+    text = 'declare void @"NRT_incref"(ptr)\ndeclare void @"NRT_Free"(ptr)\n'
+    outside = SimpleNamespace(_final_module=llvm.parse_assembly(text))
+    assert cache._asks_for_more(outside)
+    cache._make_ready("context", True)
+    assert begun == ["context"]
+
+
+def _add(x):
+    return x + 1.0
 
 
 def _kernel(value):

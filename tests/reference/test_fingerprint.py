@@ -175,6 +175,21 @@ def test_what_has_no_content_that_can_be_told_is_refused(value):
         fingerprint(_source("def f(x):\n    return x, G\n", G=value))
 
 
+def test_each_of_many_constants_and_globals_counts():
+    """Beyond 256 of either the number of one takes more than one byte."""
+    scope = {f"G{k}": float(k) for k in range(600)}
+
+    def key(k: int, of_global: float = 0.0, of_constant: float = 0.5, told: str = "") -> str:
+        values = [f"{of_constant if i == k else 1.0} + {i}.25 * G{i}" for i in range(600)]
+        text = f"def f(x):\n{told}    return {' + '.join(values)}\n"
+        return fingerprint(_source(text, **scope | {f"G{k}": of_global}))
+
+    assert fingerprint(_source("def f():\n    return G599 + 1.5\n", **scope)) != key(599)
+    for k in (0, 130, 260, 599):
+        assert len({key(k), key(k, of_global=1.5), key(k, of_constant=2.5)}) == 3
+    assert key(9, told="    'What it does.'\n") == key(9, told="    'Another.'\n")
+
+
 def test_what_numba_compiles_in_place_of_a_function_counts():
     def made(value: float) -> types.FunctionType:
         scope: dict[str, object] = {"numba": numba}

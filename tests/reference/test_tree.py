@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from numba.core import types
 from random_scenes import random_scene, random_state
-from scenes import compiled, rows_at
+from scenes import BALL, compiled, rows_at
 
 from crossbody.cases import CaseUnsupported, Mode, SceneError
 from crossbody.cases.files.case import case_of
@@ -19,11 +20,12 @@ from crossbody.cases.scene import Actuator, Body, Joint, Scene, Tendon
 from crossbody.cases.scene_rows import rows_of
 from crossbody.engines import load
 from crossbody.engines._scene import Forces, Rows
+from crossbody.engines.equations import system_of
 from crossbody.engines.mujoco import _build as build
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Strings
 from crossbody.engines.pinocchio.scene import Gaps, spans, tree
-from crossbody.reference.tree import mechanism
+from crossbody.reference.tree import mechanism, switches
 from crossbody.reference.tree.table import tabulate
 
 SEEDS = range(40)
@@ -85,10 +87,26 @@ def test_forces_do_the_work_that_the_energy_says(seed: int) -> None:
     assert close(e.imag.sum() / step, power[0] - power[1])
 
 
+def _constants(kernel: Any) -> str:
+    """Return the names of the constants of all functions that a kernel is put together from."""
+    (result,) = (one for args, one in kernel.overloads.items() if types.complex128[::1] not in args)
+    return " ".join(one.name for one in result.library._get_module_for_linking().global_variables)
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_only_scenes_whose_shapes_may_meet_compile_how_they_do(paired: bool) -> None:
+    system, made = system_of(case_of(BALL.replace(pairs=BALL.pairs * paired))), mechanism.row_kernels(paired)
+    assert (system.gaps, system.rows) == (made["gaps"], made["rows"])
+    kernels = [*made.values(), switches.switching_kernels(paired)["switch"]]
+    assert {"pair_rows5touch" in _constants(kernel) for kernel in kernels} == {paired}
+
+
+@pytest.mark.parametrize("paired", [False, True])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_rows_belong_to_their_gaps(seed: int) -> None:
+def test_rows_belong_to_their_gaps(seed: int, paired: bool) -> None:
     """H v is the rate of h, and H' v the rate of H v at v' = 0, by complex steps."""
     scene = random_scene(seed)
+    scene = scene if paired else scene.replace(pairs=())
     count = len(rows_of(scene)[0])
     if not count:
         return
@@ -98,9 +116,10 @@ def test_rows_belong_to_their_gaps(seed: int) -> None:
     w = np.zeros(table.scratch)
     still = np.zeros(len(scene.inputs))
     mechanism.dynamics(0.0, q, v, still, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
-    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
+    rows, gaps = (mechanism.row_kernels(paired)[name] for name in ("rows", "gaps"))
+    rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
-    mechanism.gaps(0.0, q + 1j * step * rates(scene, q, v), v.astype(complex), table.p.astype(complex), *moved)
+    gaps(0.0, q + 1j * step * rates(scene, q, v), v.astype(complex), table.p.astype(complex), *moved)
     assert close(moved[0].real, h)
     assert close(moved[0].imag / step, H @ v)
     assert close(moved[1].imag / step, Hdv)

@@ -37,5 +37,5 @@ def rows_at(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
     count, table = len(rows_of(scene)[0]), tabulate(scene)
     H, h, Hdv, w = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count), np.zeros(table.scratch)
     mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
-    mechanism.rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
+    mechanism.row_kernels(True)["rows"](0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     return H, h, Hdv
