@@ -298,7 +298,9 @@ class FrictionMachine(LevelMachine):
                 seen, balance = self.weigh(t, q, v)
                 lam = balance.forces(pulled=False)
                 force = lam[[seen.at[w] for w in self.sliding.ways[i]]]
-                self._begins[i] = -force / np.linalg.norm(force)
+                size = float(np.linalg.norm(force))
+                if size > 0.0:  # else it is about to let go, and slides nowhere
+                    self._begins[i] = -force / size
         self._begins = {i: way for i, way in self._begins.items() if self.modes[i] == Mode.STICK}
         if self._joining:
             self._joining |= {

@@ -115,3 +115,16 @@ def test_a_truth_without_a_closed_form_has_this_witness() -> None:
     assert truth.tier is Tier.C, truth.source
     assert "cvode" in truth.source
     assert truth.trusted == np.inf, truth.source
+
+
+@pytest.mark.slow
+def test_a_contact_that_lets_go_as_it_reaches_its_bound_begins_in_no_direction() -> None:
+    """A loaded cube comes to rest on two corners: force and bound of one vanish together."""
+    case = replace(
+        cases.load("tossed_cube", "loaded", mu=0.6, t_end=2.9e-3), limits=(),
+        q0=[0.24646014, -0.04715175, 0.0524, 0.59864801, 0.37632499, 0.59864797, -0.37632521],
+        v0=[-3.52459503e-7, -4.56710901e-7, 5.35536505e-7, 5.79357040e-13, 4.93827077e-6, 9.83987323e-6],
+    )  # fmt: skip
+    found = engines.load("reference").prepare(case, "cvode", rtol=1e-9).run()
+    assert found.outcome is Outcome.FINISHED, found.message
+    assert np.abs(found.v[-1, :3]).max() < 9.81 * case.t_end

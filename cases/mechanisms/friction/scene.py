@@ -125,7 +125,10 @@ def sphere_on_floor(p: Mapping[str, float]) -> Scene:
 def tossed_cube(p: Mapping[str, float]) -> Scene:
     """Return a free cube over a level table."""
     half = (0.5 * p["side"],) * 3
-    body = Body(name="cube", mass=p["mass"], inertia=(p["inertia"],) * 3 + (0.0,) * 3, position=(0.0, 0.0, half[2]))
+    body = Body(
+        name="cube", mass=p["mass"], com=(p["off"], 0.0, 0.0), inertia=(p["inertia"],) * 3 + (0.0,) * 3,
+        position=(0.0, 0.0, half[2]),
+    )  # fmt: skip
     return Scene(
         bodies=(body,), joints=(Joint(name="free", body="cube", type="free"),),
         shapes=(replace(FLOOR, name="table"), Shape(name="cube", body="cube", type="box", size=half)),
