@@ -424,11 +424,11 @@ class System:
 
     def gaps_along(self, q: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
         """Gaps and their rates (m, nc) along a motion, at its positions (m, nq) and velocities (m, n)."""
-        q, v = (_finite(name, np.array(value, np.float64, order="C")) for name, value in (("q", q), ("v", v)))
-        q, p = np.ascontiguousarray(self.normalised("simulate.q", q)), np.array(self.p)
-        h, hd = np.zeros((len(q), self.nc)), np.zeros((len(q), self.nc))
-        for i in range(len(q)):
-            self.gaps(0.0, q[i], v[i], p, h[i], hd[i])
+        places = np.ascontiguousarray(self._copied("q", q, (None,)))
+        speeds, p = self._copied("v", v, (len(places),)), np.array(self.p)
+        h, hd = np.zeros((len(places), self.nc)), np.zeros((len(places), self.nc))
+        for i in range(len(places)):
+            self.gaps(0.0, places[i], speeds[i], p, h[i], hd[i])
         return h, hd
 
     @checked_arguments
@@ -515,9 +515,9 @@ class System:
         """
         return self._copied(name, value)
 
-    def _copied(self, name: str, value: ArrayLike) -> Floats:
+    def _copied(self, name: str, value: ArrayLike, along: tuple[int | None, ...] = ()) -> Floats:
         at = name.startswith("q")
-        array: Floats = np.array(frozen("simulate", name, value, (self.nq if at else self.n,)))
+        array: Floats = np.array(frozen("simulate", name, value, (*along, self.nq if at else self.n)))
         _finite(name, array)
         return self.normalised(f"simulate.{name}", array) if at else array
 

@@ -246,3 +246,8 @@ def test_a_sphere_that_turns_without_end_costs_nothing_to_load(given: dict[str, 
     case = cases.load("rolling_sphere", "side_spin", **given)
     assert perf_counter() - began < 2.0
     assert case.closed_form is None
+
+
+@pytest.mark.parametrize("given", [{"stiffness": 1e300}, {"friction_loss": 1e-300, "t_end": 1e12}])
+def test_what_swings_nearly_for_ever_is_a_case_whose_truth_is_integrated(given: dict[str, float]) -> None:
+    assert cases.load("dry_oscillator", "swings", **given).closed_form is None

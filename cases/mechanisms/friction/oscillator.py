@@ -17,6 +17,8 @@ from crossbody.cases.mechanisms.friction.creep import Soft
 from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage
 from crossbody.cases.trajectory import Mode
 
+MOST_SWINGS = 1e4  # half swings that are told one by one at most
+
 Path = Callable[[Floats], tuple[Floats, Floats]]
 """Times since a start (n,), s -> place and velocity (n,), m and m/s."""
 
@@ -38,8 +40,20 @@ def _slide(x: float, v: float, way: float, p: Mapping[str, float]) -> tuple[Path
     return path, half / w
 
 
-def oscillator(p: Mapping[str, float]) -> Motion:
-    """Return the motion from place `start` at velocity `speed`: q = (x,), one row, that of friction."""
+def _half_swings(p: Mapping[str, float]) -> float:
+    """Return how often the mass turns at most until it stops, or the horizon: each costs it twice the loss over k."""
+    w = math.sqrt(p["stiffness"] / p["mass"])
+    reach = p["stiffness"] * abs(p["start"]) + w * p["mass"] * abs(p["speed"])
+    return min(p["t_end"] * w / math.pi, 0.5 * reach / p["friction_loss"])
+
+
+def oscillator(p: Mapping[str, float]) -> Motion | None:
+    """Return the motion from place `start` at velocity `speed`: q = (x,), one row, that of friction.
+
+    None where it has too many swings.
+    """
+    if not _half_swings(p) < MOST_SWINGS:
+        return None
     x, v, t, loss, stages = p["start"], p["speed"], 0.0, p["friction_loss"], list[Stage]()
     first = Mode.STICK if v == 0.0 else Mode.SLIP
 
