@@ -13,6 +13,7 @@ from __future__ import annotations
 import dis
 import enum
 import hashlib
+import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -27,6 +28,7 @@ from numba.core.extending import _Intrinsic
 from numba.core.typing.templates import builtin_registry
 
 LIBRARIES = frozenset({"numba", "numpy", "llvmlite", "scipy"})
+_PYTHON = os.path.join(os.path.realpath(os.path.dirname(os.__file__)), "")
 _NAMED = (ModuleType, type, FunctionType, BuiltinFunctionType, type(np.sum))
 _SAME = {int, float, complex, bool, str, bytes, tuple, np.float64, np.int64}
 _PLAIN = (type(None), type(Ellipsis), bool, int, float, complex, str, bytes)
@@ -172,6 +174,8 @@ class _Walk:
             self.put("dtype", repr(value), str(value.itemsize), str(value.alignment), str(value.isalignedstruct))
         elif (library := _library(value)) is not None:
             self.put("library", library, str(getattr(value, "__qualname__", "") or getattr(value, "__name__", "")))
+            for overload in _overloads_of_users(value):
+                self.function(overload)
         elif isinstance(value, FunctionType):
             self.put("function")
             self.function(value)
@@ -213,6 +217,9 @@ class _Walk:
         self.put("module", module.__name__)
         if (library := _library(module)) is not None:
             self.put(library)
+            for name in sorted(names & vars(module).keys()):
+                for overload in _overloads_of_users(vars(module)[name]):
+                    self.function(overload)
         elif self.first((id(module), names), module):
             for name in sorted(names & vars(module).keys()):
                 self.put(name)
@@ -296,9 +303,19 @@ def _bindings(function: FunctionType, reads: _Reads) -> Iterator[tuple[str, Any]
 
 
 @cache
+@cache
+def _is_pythons(package: str) -> bool:
+    """Whether a module is one of Python's own, and no file of a user's with the name of one."""
+    if package not in sys.stdlib_module_names:
+        return False
+    file = getattr(sys.modules.get(package), "__file__", None)
+    home, _, rest = os.path.realpath(file or _PYTHON).partition(_PYTHON)
+    return home == "" and not rest.startswith("site-packages")
+
+
 def _version(package: str) -> str | None:
     """Name and version of a library; None for a module that is none."""
-    if package in sys.stdlib_module_names:
+    if _is_pythons(package):
         return f"{package} of Python {sys.version}"
     return f"{package} {sys.modules[package].__version__}" if package in LIBRARIES else None
 
@@ -319,6 +336,24 @@ def _overloads(function: FunctionType) -> list[FunctionType]:
     kinds = [kind for value, kind in builtin_registry.globals if value is function]
     found = [getattr(template, "_overload_func", None) for kind in kinds for template in getattr(kind, "templates", ())]
     return [part for part in found if isinstance(part, FunctionType)]
+
+
+def _overloads_of_users(function: Any) -> list[FunctionType]:
+    """What numba compiles in place of a function of a library by a user's leave (`numba.extending.overload`)."""
+    known = len(builtin_registry.globals)
+    return [overload for value, overload in _all_overloads_of_users(known) if value is function]
+
+
+@lru_cache(maxsize=1)
+def _all_overloads_of_users(known: int) -> list[tuple[Any, FunctionType]]:
+    """Functions and what users overload them by; `known` is how many entries numba's registry has."""
+    return [
+        (value, overload)
+        for value, kind in builtin_registry.globals[:known]
+        for template in getattr(kind, "templates", ())
+        if isinstance(overload := getattr(template, "_overload_func", None), FunctionType)
+        and _version((overload.__module__ or "").partition(".")[0]) is None
+    ]
 
 
 def _functions(module: ModuleType) -> Iterator[FunctionType]:

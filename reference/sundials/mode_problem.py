@@ -163,13 +163,16 @@ class ModeProblem:
             return {**ways, **{i: np.array([np.cos(a), np.sin(a)]) for i, a in zip(free, angles, strict=True)}}
 
         def aside(angles: Floats) -> Floats:
+            if not np.isfinite(angles).all():  # where no direction agrees the search runs away
+                return np.full(len(free), self.scale)
             tried = self._solved(modes, turned(angles))
             return np.array([self._across(tried, i) for i in free])
 
         found = self._solved(modes, dict(ways))
         if free and max(abs(self._across(found, i)) for i in free) > self.limit:
             start = np.array([np.arctan2(ways[i][1], ways[i][0]) for i in free])
-            found = self._solved(modes, turned(root(aside, start, tol=1e-13).x))
+            angles = root(aside, start, tol=1e-13).x
+            found = self._solved(modes, turned(angles)) if np.isfinite(angles).all() else found
         return found
 
     def _solved(self, modes: dict[int, Mode], ways: dict[int, Floats]) -> Tried:

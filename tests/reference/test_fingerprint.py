@@ -201,6 +201,31 @@ def test_what_numba_compiles_in_place_of_a_function_counts():
     assert fingerprint(made(1.0)) != fingerprint(made(2.0))
 
 
+def test_what_a_user_has_numba_compile_in_place_of_a_library_function_counts():
+    def key(value: float) -> str:
+        text = f"@numba.extending.overload(math.ulp)\ndef of_ulp(x):\n    return lambda x: {value!r}\n"
+        exec(text, {"numba": numba, "math": math})
+        return fingerprint(_source("def f(x):\n    return math.ulp(x)\n", math=math))
+
+    assert len({key(value) for value in (1.0, 2.0, 3.0)}) == 3
+
+
+def test_a_file_of_a_user_with_the_name_of_a_module_of_python_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def key(value: float) -> str:
+        (tmp_path / "tabnanny.py").write_text(f"G = {value!r}\ndef of(x):\n    return x + {value!r}\n")
+        monkeypatch.delitem(sys.modules, "tabnanny", raising=False)
+        module = types.ModuleType("tabnanny")
+        module.__file__ = str(tmp_path / "tabnanny.py")
+        exec((tmp_path / "tabnanny.py").read_text(), vars(module))
+        monkeypatch.setitem(sys.modules, "tabnanny", module)
+        return fingerprint(_source("def f(x):\n    return tabnanny.G + of(x)\n", tabnanny=module, of=module.of))
+
+    assert key(1.0) == key(1.0)
+    assert key(1.0) != key(2.0)
+
+
 def _anew(function: types.FunctionType) -> Lean:
     return Lean(function, targetoptions={"nopython": True}, pipeline_class=WholePasses)
 
