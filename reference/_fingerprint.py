@@ -174,7 +174,7 @@ class _Walk:
             self.put("dtype", repr(value), str(value.itemsize), str(value.alignment), str(value.isalignedstruct))
         elif (library := _library(value)) is not None:
             self.put("library", library, str(getattr(value, "__qualname__", "") or getattr(value, "__name__", "")))
-            for overload in _overloads_of_users(value):
+            for overload in _overloads(value):
                 self.function(overload)
         elif isinstance(value, FunctionType):
             self.put("function")
@@ -218,7 +218,7 @@ class _Walk:
         if (library := _library(module)) is not None:
             self.put(library)
             for name in sorted(names & vars(module).keys()):
-                for overload in _overloads_of_users(vars(module)[name]):
+                for overload in _overloads(vars(module)[name]):
                     self.function(overload)
         elif self.first((id(module), names), module):
             for name in sorted(names & vars(module).keys()):
@@ -302,8 +302,6 @@ def _bindings(function: FunctionType, reads: _Reads) -> Iterator[tuple[str, Any]
             yield name, function.__globals__[name]
 
 
-@cache
-@cache
 def _is_pythons(package: str) -> bool:
     """Whether a module is one of Python's own, and no file of a user's with the name of one."""
     if package not in sys.stdlib_module_names:
@@ -313,6 +311,7 @@ def _is_pythons(package: str) -> bool:
     return home == "" and not rest.startswith("site-packages")
 
 
+@cache
 def _version(package: str) -> str | None:
     """Name and version of a library; None for a module that is none."""
     if _is_pythons(package):
@@ -330,23 +329,16 @@ def _library(value: Any) -> str | None:
     return _version(home.partition(".")[0])
 
 
-def _overloads(function: FunctionType) -> list[FunctionType]:
+def _overloads(function: Any) -> list[FunctionType]:
     """What numba compiles in place of a function that is not compiled itself (`numba.extending.overload`)."""
     # What the compiler itself would be asked for has to be set up first, which takes longer than all that is read here.
-    kinds = [kind for value, kind in builtin_registry.globals if value is function]
-    found = [getattr(template, "_overload_func", None) for kind in kinds for template in getattr(kind, "templates", ())]
-    return [part for part in found if isinstance(part, FunctionType)]
-
-
-def _overloads_of_users(function: Any) -> list[FunctionType]:
-    """What numba compiles in place of a function of a library by a user's leave (`numba.extending.overload`)."""
     known = len(builtin_registry.globals)
-    return [overload for value, overload in _all_overloads_of_users(known) if value is function]
+    return [overload for value, overload in _all_overloads(known) if value is function]
 
 
 @lru_cache(maxsize=1)
-def _all_overloads_of_users(known: int) -> list[tuple[Any, FunctionType]]:
-    """Functions and what users overload them by; `known` is how many entries numba's registry has."""
+def _all_overloads(known: int) -> list[tuple[Any, FunctionType]]:
+    """Functions and what others than libraries overload them by; `known` is how many entries numba's registry has."""
     return [
         (value, overload)
         for value, kind in builtin_registry.globals[:known]
