@@ -18,7 +18,7 @@ from crossbody.reference.tree.pair_rows import gradient, touch
 from crossbody.reference.tree.points import point, pull
 
 REAL = 8  # bytes of a number that is not complex
-PAIRED = True  # whether shapes may meet; another value is seen by `without_pairs` alone
+PAIRED = True  # whether shapes may meet; another value is seen by `declared` alone
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
 
 
@@ -327,10 +327,17 @@ def row_kernels(paired: bool) -> dict[str, Any]:
     Args:
         paired: whether rows of contacts are among them.
     """
-    made = (gaps, rows) if paired else map(without_pairs, (gaps, rows))
+    return declared((gaps, rows), paired)
+
+
+def declared(functions: tuple[Any, ...], paired: bool) -> dict[str, Any]:
+    """Return functions as the kernels that they are named after, which read PAIRED as given.
+
+    Where it is False what stands behind it is not compiled.
+    """
+    made = functions if paired else map(_without_pairs, functions)
     return {one.__name__: getattr(kernels, one.__name__)(one) for one in made}
 
 
-def without_pairs(function: Any) -> Any:
-    """Return a function that reads False for PAIRED: what stands behind it is not compiled."""
+def _without_pairs(function: Any) -> Any:
     return FunctionType(function.__code__, {**function.__globals__, "PAIRED": False})

@@ -16,7 +16,7 @@ from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
 from crossbody.reference.tree import balls, kinks, layout, sweeps
 from crossbody.reference.tree import pair_slip as slip
-from crossbody.reference.tree.mechanism import without_pairs
+from crossbody.reference.tree.mechanism import declared
 from crossbody.reference.tree.pair_rows import axis, cap, chosen, lowest, touch, turn, upside_down
 
 PAIRED = True  # as in `mechanism`
@@ -179,5 +179,4 @@ def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -
 @cache
 def switching_kernels(paired: bool) -> dict[str, Any]:
     """Return the kernels of switches, of a scene whose shapes may meet or of another (`mechanism.row_kernels`)."""
-    made = (watch, switch) if paired else map(without_pairs, (watch, switch))
-    return {one.__name__: getattr(kernels, one.__name__)(one) for one in made}
+    return declared((watch, switch), paired)
