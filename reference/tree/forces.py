@@ -254,6 +254,10 @@ def within(x: Any, p: Array, o: int) -> Any:
 
 
 @kernels.helper
-def bounded(p: Array, sums: Array, j: int) -> Any:
-    """Return the sum (n,) of the actuators' forces on velocity j within its bounds."""
-    return held(sums[j], p, int(p[layout.AT_DOF].real) + layout.DOF * j + layout.SUM)
+def driven(t: float, q: Array, v: Array, u: Array, p: Array, w: Array, sums: Array) -> None:
+    """Fill sums (n,) with the actuators' forces on every velocity, within the bounds of their sum."""
+    at_dof = int(p[layout.AT_DOF].real)
+    sums[:] = 0.0
+    actuated(t, q, v, u, p, w, sums)
+    for j in range(len(sums)):
+        sums[j] = held(sums[j], p, at_dof + layout.DOF * j + layout.SUM)

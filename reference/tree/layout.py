@@ -13,8 +13,9 @@ NODES, DOFS, ACTUATORS, TENDONS, ROWS, GRAVITY, AT_DOF, AT_ACTUATOR, AT_TENDON, 
 # sides on which they are, and their bands stand, and the tolerance that is in force: the inputs follow it.
 RESTING, POSED, PUSHES, AT_PUSH, AT_SIDE, SPANNED, LYING, KINKS, AT_KINK, AT_BEND, AT_BAND, AT_TOLD = range(14, 26)
 # How many of the kinks are those of sums of forces, of gaps, and of actuators on one hinge or slide each; where the
-# code of the sweeps stands that was traced for the model, 0 for none.
-SUMMED, GAPPED, PLAIN, TRACED, HEAD = 26, 27, 28, 29, 30
+# code of the sweeps stands that was traced for the model, 0 for none; how many actuators can exert a force, and of how
+# many velocities the sum of such forces is bounded.
+SUMMED, GAPPED, PLAIN, TRACED, EXERTING, BOUNDED, HEAD = 26, 27, 28, 29, 30, 31, 32
 
 # A node: what it is, its pose in its parent, its inertia, and what its joint does by itself.
 TYPE, PARENT, Q, V, ROOT, REFERENCE, POSE, AXIS, ANCHOR, MASS, COM, INERTIA, LIFT, STIFFNESS, REST, NODE = (

@@ -37,12 +37,13 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
     code = p[layout.TRACED].real if q.itemsize == REAL else 0.0
     if code == 0.0 or p[layout.SPANNED].real > 0.0:
         sweeps.outwards(q, v, p, w)
-    if len(u) > 0:
+    if p[layout.BOUNDED].real > 0.0:
         sums = w[len(w) - len(f) :]
-        sums[:] = 0.0
-        forces.actuated(t, q, v, u, p, w, sums)
+        forces.driven(t, q, v, u, p, w, sums)
         for j in range(len(f)):
-            f[j] += forces.bounded(p, sums, j)
+            f[j] += sums[j]
+    elif p[layout.EXERTING].real > 0.0:
+        forces.actuated(t, q, v, u, p, w, f)
     if p[layout.SPANNED].real > 0.0:
         forces.stretched(p, w, f)
     if code != 0.0:
@@ -270,11 +271,11 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
     given, taken = 0.0 * v[0], 0.0 * v[0]
     posed = p[layout.PUSHES].real > 0.0 or p[layout.SPANNED].real > 0.0
     w = sweeps.posed(q, v, p) if posed else np.empty(0, dtype=q.dtype)
-    if len(u) > 0:
-        sums = np.zeros(n, dtype=q.dtype)
-        forces.actuated(t, q, v, u, p, w, sums)
+    if p[layout.BOUNDED].real > 0.0 or p[layout.EXERTING].real > 0.0:
+        sums = np.empty(n, dtype=q.dtype)
+        forces.driven(t, q, v, u, p, w, sums)
         for j in range(n):
-            given += v[j] * forces.bounded(p, sums, j)
+            given += v[j] * sums[j]
     for j in range(n):
         taken += v[j] * forces.damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
     for i in range(int(p[layout.TENDONS].real)):

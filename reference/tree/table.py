@@ -266,6 +266,9 @@ class _Builder:
         head[layout.PLAIN] = sum(
             kind == layout.FORCE_BENDS and actuators[i][layout.SINGLE] for kind, i, *_ in self.kinks
         )
+        head[layout.EXERTING] = sum(map(_exerts, scene.actuators))
+        if actuators:
+            head[layout.BOUNDED] = sum(np.isfinite(row[layout.SUM : layout.SUM + 2]).any() for row in self.dof_rows)
         packed = np.concatenate([head, *(row for part in parts for row in part)])
         finite: Floats = np.clip(packed, -1e300, 1e300)
         return finite  # a bound that is not there: parameters are finite
@@ -343,6 +346,12 @@ class _Builder:
 def _moves(actuator: Actuator) -> bool:
     """Whether its force changes while its control holds."""
     return bool(actuator.activation) or any(actuator.gain[1:]) or any(actuator.bias[1:])
+
+
+def _exerts(actuator: Actuator) -> bool:
+    """Whether there is a force for any control: by its constants, or by a bound that leaves zero out."""
+    low, high = actuator.force_range
+    return any(actuator.gain) or any(actuator.bias) or not low <= 0.0 <= high
 
 
 def _bends(bounds: Vector) -> bool:

@@ -58,3 +58,19 @@ def test_engines_bound_forces_where_the_scene_does(name: str, who: str) -> None:
     found = engines.load(engine).prepare(case, profile).run()
     assert found.outcome is Outcome.FINISHED
     assert abs(found.q[-1, 0] - wanted) <= 1e-6
+
+
+@pytest.mark.parametrize("who", ["reference:compiled", "reference:cvode", "mujoco:matched", "pinocchio:law"])
+@pytest.mark.parametrize("actuator", [(1.0, 2.0), (-np.inf, np.inf)])
+@pytest.mark.parametrize("joint", [(1.0, 2.0), (-np.inf, np.inf)])
+def test_a_range_without_zero_pushes_where_nothing_else_does(
+    who: str, actuator: tuple[float, float], joint: tuple[float, float]
+) -> None:
+    """What can exert no force is left out of the sum; the lower bound of a range is a force."""
+    dead = Actuator(name="dead", joint="x", force_range=actuator)
+    scene = FREE.replace(joints=(replace(SLIDE, force_range=joint),), actuators=(dead,))
+    engine, profile = who.split(":")
+    found = engines.load(engine).prepare(cases.from_scene(scene, q0=[START], t_end=1.0), profile).run()
+    force = 1.0 if actuator[0] == 1.0 or joint[0] == 1.0 else 0.0
+    assert found.outcome is Outcome.FINISHED
+    assert abs(found.q[-1, 0] - START - force / MASS / 2.0) <= 1e-6
