@@ -42,8 +42,12 @@ _SETTINGS = (
 )  # fmt: skip
 
 OURS = "crossbody.reference."
-ALLOCATES_NOTHING = ("crossbody.reference.core.", "crossbody.reference.sundials.compiled.")
-"""The modules whose compiled functions make no arrays: numba refuses one that would."""
+ALLOCATES_NOTHING = tuple(
+    OURS + name for name in ("core.", "delta.", "pairs.", "sundials.compiled.", "systems.", "tree.")
+)
+"""The packages whose compiled functions make no arrays: numba refuses one that would."""
+ALLOCATES = tuple(OURS + name for name in ("systems.red_body", "tree.kinks", "tree.quantities", "tree.switches"))
+"""The modules in them that do. Only these hand arrays out: whoever counts references would take one too many."""
 
 FORMAT = "3"  # what `save_overload` writes; another number for every change of it
 
@@ -346,8 +350,8 @@ def compiled(
     if numba_config.DISABLE_JIT:
         return function
     options = {"error_model": "numpy", "nogil": nogil} | ({"boundscheck": True} if debugging() else {})
-    if _home(function).startswith(ALLOCATES_NOTHING):
-        options["_nrt"] = False  # references are not counted, which is a sixth of the code to compile
+    if (home := _home(function)).startswith(ALLOCATES_NOTHING) and home not in ALLOCATES:
+        options["_nrt"] = False  # no references are counted: a sixth of the code to compile, up to 40 % of a run
     if not signatures and not lazy:
         return Part(function, options)
     found = Compiled(function, targetoptions=options, declared=(*signatures, *lazy))

@@ -1,9 +1,7 @@
-"""The kernels of a scene: mass matrix and forces, gaps and rows, energy and power."""
+"""The kernels of a scene that are given scratch: mass matrix and forces, active rows; and rates of positions."""
 
 from __future__ import annotations
 
-from functools import cache
-from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -18,12 +16,12 @@ from crossbody.reference.tree.pair_rows import gradient, touch
 from crossbody.reference.tree.points import point, pull
 
 REAL = 8  # bytes of a number that is not complex
-PAIRED = True  # whether shapes may meet; another value is seen by `declared` alone
+PAIRED = True  # whether shapes may meet; another value is seen by `quantities.declared` alone
 PULL = 0.1  # 1/s, of a quaternion to length 1: a tenth of a rate that would cost steps
 
 
 @kernels.helper
-def _pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
+def pushed(u: Array, p: Array, w: Array, i: int) -> tuple[int, Any, Any]:
     """Return which node push i acts on, the motion of the point there, and the force."""
     o, k = int(p[layout.AT_PUSH].real) + layout.PUSH * i, int(p[layout.ACTUATORS].real) + 3 * i
     node = int(p[o + layout.PUSHED].real)
@@ -51,7 +49,7 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
     else:
         sweeps.inwards(p, w, M, f)
     for i in range(int(p[layout.PUSHES].real)):
-        node, x, force = _pushed(u, p, w, i)
+        node, x, force = pushed(u, p, w, i)
         pull(p, w, node, 1.0, force, value(x), f)
 
 
@@ -86,7 +84,7 @@ def _along(p: Array, kind: int, o: int, slope: Any, H: Array) -> None:
 
 
 @kernels.helper
-def _row(q: Array, v: Array, p: Array, i: int) -> Any:
+def joint_row(q: Array, v: Array, p: Array, i: int) -> Any:
     """Return gap, rate and H' v of row i."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     kind = int(p[o].real)
@@ -125,7 +123,7 @@ def _gradient(q: Array, v: Array, p: Array, i: int, H: Array) -> None:
 
 
 @kernels.helper
-def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
+def contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
     """Return where the pair of row i stands in p, and gap, normal and place of its contact."""
     o = int(p[layout.AT_ROW].real) + layout.ROW * i
     at = int(p[layout.AT_PAIR].real) + pairs.PAIR * int(p[o + pairs.WHICH].real)
@@ -133,7 +131,7 @@ def _contact(p: Array, w: Array, i: int) -> tuple[int, Any]:
 
 
 @kernels.helper
-def _slip(p: Array, w: Array, i: int) -> Any:
+def slip_of(p: Array, w: Array, i: int) -> Any:
     """Return of the tangential row i where its pair stands in p, where its shapes meet, and both directions there.
 
     Its own comes first; the other one is that of its partner, the next row of a contact in space.
@@ -146,42 +144,13 @@ def _slip(p: Array, w: Array, i: int) -> Any:
 
 
 @kernels.helper
-def _has_partner(p: Array, i: int, k: int) -> bool:
+def has_partner(p: Array, i: int, k: int) -> bool:
     """Return whether row k is the second tangential row of the contact of which row i is the first one."""
     o, step = int(p[layout.AT_ROW].real), layout.ROW
     one, other = o + step * i, o + step * k
     first = p[one + pairs.ACROSS].real == 0.0 and int(p[other].real) == layout.TANGENT
     across = p[other + pairs.ACROSS].real != 0.0 and p[one + pairs.WHICH].real == p[other + pairs.WHICH].real
     return bool(first and across and p[one + pairs.PLACE].real == p[other + pairs.PLACE].real)
-
-
-def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
-    """Of every row; where points or shapes of bodies are to meet their poses are computed first."""
-    w = sweeps.posed(q, v, p) if p[layout.POSED].real > 0.0 else np.empty(0, dtype=q.dtype)
-    paired = -1
-    for i in range(len(h)):
-        if i == paired:
-            continue
-        kind = int(p[int(p[layout.AT_ROW].real) + layout.ROW * i].real)
-        if kind == layout.CONNECT:
-            h[i], hd[i], _ = loops.connect(p, i, w)
-        elif kind == layout.TURN:
-            h[i], hd[i], _ = loops.turn(p, i, w)
-        elif kind in (layout.STRING, layout.DRY_STRING):
-            h[i], hd[i], _ = strings.string(p, i, w)
-            if kind == layout.DRY_STRING:
-                h[i] = 0.0 * w[0]
-        elif PAIRED and kind == layout.CONTACT:
-            found = _contact(p, w, i)[1][0]
-            h[i], hd[i] = found[0], found[1]
-        elif PAIRED and kind == layout.TANGENT:
-            at, x, way, other = _slip(p, w, i)
-            h[i], hd[i] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[0]
-            if i + 1 < len(h) and _has_partner(p, i, i + 1):
-                paired = i + 1
-                h[paired], hd[paired] = 0.0 * w[0], slip.velocity(p, w, at, x, other)[0]
-        else:
-            h[i], hd[i], _ = _row(q, v, p, i)
 
 
 def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, H: Array, h: Array, Hdv: Array) -> None:
@@ -204,89 +173,20 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
                 h[j] = 0.0 * w[0]
             strings.string_columns(p, idx[j], w, H[j])
         elif PAIRED and kind == layout.CONTACT:
-            at, (gap, n, place) = _contact(p, w, idx[j])
+            at, (gap, n, place) = contact(p, w, idx[j])
             h[j], Hdv[j] = gap[0], gap[2]
             gradient(p, w, at, n, place, H[j])
         elif PAIRED and kind == layout.TANGENT:
-            at, x, way, other = _slip(p, w, idx[j])
+            at, x, way, other = slip_of(p, w, idx[j])
             h[j], Hdv[j] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[1]
             slip.columns(p, w, at, x, way, H[j])
-            if j + 1 < na and _has_partner(p, idx[j], idx[j + 1]):
+            if j + 1 < na and has_partner(p, idx[j], idx[j + 1]):
                 paired = j + 1
                 h[paired], Hdv[paired] = 0.0 * w[0], slip.velocity(p, w, at, x, other)[1]
                 slip.columns(p, w, at, x, other, H[paired])
         else:
-            h[j], _, Hdv[j] = _row(q, v, p, idx[j])
+            h[j], _, Hdv[j] = joint_row(q, v, p, idx[j])
             _gradient(q, v, p, idx[j], H[j])
-
-
-@kernels.helper
-def _stored(q: Array, p: Array, o: int) -> Any:
-    """Return the energy of the spring of the node at p[o:]."""
-    at, k = int(p[o + layout.Q].real), o + layout.STIFFNESS
-    if p[k] == 0.0 and p[k + 1] == 0.0 and p[k + 2] == 0.0:
-        return 0.0 * q[0]
-    if p[o + layout.TYPE].real >= layout.SLIDE:
-        return forces.stored(p, k, q[at] - p[o + layout.REST])
-    x, y, z = forces.turn(q, at + 3 if p[o + layout.TYPE].real == layout.FREE else at, p, o + layout.REST)
-    return forces.stored(p, k, np.sqrt(x * x + y * y + z * z))
-
-
-@kernels.energy
-def energy(q: Array, v: Array, p: Array, e: Array) -> None:
-    """T = sum of V.IV/2 over the nodes and of armatures; V of weight, of what is spared of it, and of springs."""
-    nodes = int(p[layout.NODES].real)
-    w = sweeps.posed(q, v, p)
-    kinetic, potential = 0.0 * q[0], p[layout.RESTING] + 0.0 * q[0]
-    for i in range(nodes):
-        o, x = int(p[layout.AT_NODE].real) + layout.NODE * i, layout.NODE_SCRATCH * i
-        root = layout.NODE_SCRATCH * int(p[o + layout.ROOT].real) + layout.ORIGIN_AT
-        sweeps.inertia(p, p[o:], w[x:])
-        y, at = x + layout.V_AT, x + layout.I_AT
-        n, f = sweeps.times(w, at, w[y], w[y + 1], w[y + 2], w[y + 3], w[y + 4], w[y + 5])
-        kinetic += w[y] * n[0] + w[y + 1] * n[1] + w[y + 2] * n[2] + w[y + 3] * f[0] + w[y + 4] * f[1] + w[y + 5] * f[2]
-        m = p[o + layout.MASS]
-        lifted = o + layout.LIFT  # what its parts are spared: sum of c m, and of c m times their centres
-        c0 = m * p[o + layout.COM] - p[lifted + 1]
-        c1 = m * p[o + layout.COM + 1] - p[lifted + 2]
-        c2 = m * p[o + layout.COM + 2] - p[lifted + 3]
-        moment = sweeps.turned(w, x, c0, c1, c2)
-        for k in range(3):
-            potential -= p[layout.GRAVITY + k] * (moment[k] + (m - p[lifted]) * (w[root + k] + w[x + 9 + k]))
-        potential += _stored(q, p, o)
-    for j in range(len(v)):
-        kinetic += p[int(p[layout.AT_DOF].real) + layout.DOF * j + layout.ARMATURE] * v[j] * v[j]
-    for i in range(int(p[layout.TENDONS].real)):
-        o = forces.tendon(p, i)
-        k = o + layout.STIFF
-        if p[k] != 0.0 or p[k + 1] != 0.0 or p[k + 2] != 0.0:  # points of a string may meet, where it has no direction
-            potential += forces.stored(p, k, forces.slack(p, o, forces.measured(q, v, p, w, o)[0]))
-    e[0], e[1] = 0.5 * kinetic, potential
-
-
-@kernels.power
-def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
-    """Of the actuators and pushes, and what dampers take."""
-    n, at_dof = len(v), int(p[layout.AT_DOF].real)
-    given, taken = 0.0 * v[0], 0.0 * v[0]
-    posed = p[layout.PUSHES].real > 0.0 or p[layout.SPANNED].real > 0.0
-    w = sweeps.posed(q, v, p) if posed else np.empty(0, dtype=q.dtype)
-    if p[layout.BOUNDED].real > 0.0 or p[layout.EXERTING].real > 0.0:
-        sums = np.empty(n, dtype=q.dtype)
-        forces.driven(t, q, v, u, p, w, sums)
-        for j in range(n):
-            given += v[j] * sums[j]
-    for j in range(n):
-        taken += v[j] * forces.damper(p, at_dof + layout.DOF * j + layout.DAMPING, v[j])
-    for i in range(int(p[layout.TENDONS].real)):
-        o = forces.tendon(p, i)
-        if p[o + layout.COUNT].real > 0.0 or p[layout.SPANNED].real > 0.0:
-            speed = forces.measured(q, v, p, w, o)[1]
-            taken += speed * forces.damper(p, o + layout.DAMP, speed)
-    for i in range(int(p[layout.PUSHES].real)):
-        _, x, force = _pushed(u, p, w, i)
-        given += force[0] * x[0][1] + force[1] * x[1][1] + force[2] * x[2][1]
-    e[0], e[1] = given, taken
 
 
 @kernels.helper
@@ -315,30 +215,3 @@ def velocity(t: float, q: Array, v: Array, p: Array, qd: Array) -> None:
             _turn(q, at + 3, v, j + 3, qd)
         else:
             _turn(q, at, v, j, qd)
-
-
-KERNELS: dict[str, Any] = {"dynamics": dynamics, "energy": energy, "power": power}
-"""Those of every scene; it has those of `row_kernels` beside them."""
-
-
-@cache
-def row_kernels(paired: bool) -> dict[str, Any]:
-    """Return the kernels of rows, of a scene whose shapes may meet or of another, which takes half as long to compile.
-
-    Args:
-        paired: whether rows of contacts are among them.
-    """
-    return declared((gaps, rows), paired)
-
-
-def declared(functions: tuple[Any, ...], paired: bool) -> dict[str, Any]:
-    """Return functions as the kernels that they are named after, which read PAIRED as given.
-
-    Where it is False what stands behind it is not compiled.
-    """
-    made = functions if paired else map(_without_pairs, functions)
-    return {one.__name__: getattr(kernels, one.__name__)(one) for one in made}
-
-
-def _without_pairs(function: Any) -> Any:
-    return FunctionType(function.__code__, {**function.__globals__, "PAIRED": False})

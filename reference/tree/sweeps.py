@@ -169,14 +169,6 @@ def outwards(q: Array, v: Array, p: Array, scratch: Array) -> None:
 
 
 @kernels.helper
-def posed(q: Array, v: Array, p: Array) -> Array:
-    """Return the scratch of the outward sweep, filled."""
-    w = np.empty(layout.NODE_SCRATCH * int(p[layout.NODES].real) + layout.DOF_SCRATCH * len(v), dtype=q.dtype)
-    outwards(q, v, p, w)
-    return w
-
-
-@kernels.helper
 def times(
     w: Array, i: int, a: Any, b: Any, c: Any, x: Any, y: Any, z: Any
 ) -> tuple[tuple[Any, Any, Any], tuple[Any, Any, Any]]:

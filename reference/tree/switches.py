@@ -14,10 +14,10 @@ from crossbody.reference import kernels
 from crossbody.reference.kernels import CHANGED, GIVEN, START, TOUCHED, UNCHANGED
 from crossbody.reference.kinds import Bytes, Floats
 from crossbody.reference.pairs import layout as pairs
-from crossbody.reference.tree import balls, kinks, layout, sweeps
+from crossbody.reference.tree import balls, kinks, layout
 from crossbody.reference.tree import pair_slip as slip
-from crossbody.reference.tree.mechanism import declared
 from crossbody.reference.tree.pair_rows import axis, cap, chosen, lowest, touch, turn, upside_down
+from crossbody.reference.tree.quantities import declared, posed
 
 PAIRED = True  # as in `mechanism`
 FREE = 0  # a mode, as in crossbody.cases.Mode
@@ -37,7 +37,7 @@ def _pair(p: Floats, i: int) -> int:
 @kernels.helper
 def _posed(q: Floats, v: Floats, p: Floats) -> Floats:
     """Return the scratch of the outward sweep, if something looks at poses."""
-    return sweeps.posed(q, v, p) if p[layout.LYING] > 0.0 or p[layout.SPANNED] > 0.0 or kinks.held(p) else q
+    return posed(q, v, p) if p[layout.LYING] > 0.0 or p[layout.SPANNED] > 0.0 or kinks.held(p) else q
 
 
 def watch(t: float, q: Floats, v: Floats, p: Floats, g: Floats) -> None:
@@ -148,7 +148,7 @@ def _bend(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) ->
         if not anew and fired != sides + k:
             continue
         if not looked:
-            looked, w = True, sweeps.posed(q, v, p)
+            looked, w = True, posed(q, v, p)
             total = kinks.sums(t, q, v, kinks.inputs(p), p, w)
         kinks.choose(t, q, v, p, w, total, k, not anew)
 
@@ -178,5 +178,5 @@ def switch(t: float, q: Floats, v: Floats, p: Floats, mode: Bytes, fired: int) -
 
 @cache
 def switching_kernels(paired: bool) -> dict[str, Any]:
-    """Return the kernels of switches, of a scene whose shapes may meet or of another (`mechanism.row_kernels`)."""
+    """Return the kernels of switches, of a scene whose shapes may meet or of another (`quantities.row_kernels`)."""
     return declared((watch, switch), paired)

@@ -17,7 +17,8 @@ from crossbody.reference._activations import Activations
 from crossbody.reference._redundant import ranked
 from crossbody.reference.kinds import Floats
 from crossbody.reference.tree import layout
-from crossbody.reference.tree.mechanism import KERNELS, row_kernels, velocity
+from crossbody.reference.tree.mechanism import velocity
+from crossbody.reference.tree.quantities import KERNELS, row_kernels
 from crossbody.reference.tree.switches import switching_kernels
 from crossbody.reference.tree.table import dof_parents, tabulate
 from crossbody.reference.tree.traced import compiled_sweeps

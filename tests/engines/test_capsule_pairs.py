@@ -20,7 +20,7 @@ from crossbody.engines.equations import system_of
 from crossbody.reference.pairs import layout
 from crossbody.reference.tree import layout as tree
 from crossbody.reference.tree.pair_rows import chosen, touch
-from crossbody.reference.tree.sweeps import posed
+from crossbody.reference.tree.quantities import posed
 
 RADII = (0.02, 0.03)
 EXACT = [0.0, 1e-16, 1e-13, 1e-10, 1e-7, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.4, 0.6, 1.0, np.pi / 2]

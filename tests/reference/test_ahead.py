@@ -4,7 +4,9 @@ import gc
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from numba.core.types.functions import BaseFunction
 
 from crossbody.reference import _program, ahead, code_store, kernels
 from crossbody.reference._hastened import hastened
-from crossbody.reference.cache import ALLOCATES_NOTHING, compiled
+from crossbody.reference.cache import ALLOCATES, ALLOCATES_NOTHING, Compiled, Part, compiled
 from crossbody.reference.systems import absent
 
 
@@ -24,6 +26,10 @@ def doubled(x: float) -> float:
 
 def moved(x: np.ndarray) -> None:
     x[1:] = x[:-1]
+
+
+def submodules(package: str) -> Iterator[str]:
+    return (one.name for one in walk_packages(import_module(package).__path__, f"{package}."))
 
 
 @pytest.fixture
@@ -129,8 +135,26 @@ def test_the_collector_and_numba_are_as_they_were() -> None:
     assert BaseFunction.get_call_type is before
 
 
-def test_the_core_is_refused_what_allocates(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("package", ALLOCATES_NOTHING)
+def test_what_allocates_is_refused(monkeypatch: pytest.MonkeyPatch, package: str) -> None:
     """What is moved within an array is copied first, by numba: memory, and twenty functions on strings to compile."""
-    monkeypatch.setattr(moved, "__module__", ALLOCATES_NOTHING[0] + "advance")
+    monkeypatch.setattr(moved, "__module__", package + "one")
     with pytest.raises(NumbaRuntimeError, match="NRT required"):
         compiled(moved, [void(float64[::1])])
+
+
+@pytest.mark.parametrize("module", ALLOCATES)
+def test_modules_that_make_arrays_are_there_and_count_references(module: str) -> None:
+    functions = [one for one in vars(import_module(module)).values() if getattr(one, "__module__", "") == module]
+    assert any(isinstance(one, (Part, Compiled)) for one in functions)
+    assert not any("_nrt" in one.targetoptions for one in functions if isinstance(one, (Part, Compiled)))
+
+
+def test_what_counts_no_references_hands_out_no_array() -> None:
+    """Who counts them takes one away at the end, for which nobody added one: the core alone, which counts none, may."""
+    names = (name for one in ("delta", "pairs", "systems", "tree") for name in submodules(f"crossbody.reference.{one}"))
+    found = [one for name in names for one in vars(import_module(name)).values() if isinstance(one, (Part, Compiled))]
+    uncounted = [one for one in found if "_nrt" in one.targetoptions]
+    assert len(uncounted) > 100
+    told = [str(one.py_func.__annotations__["return"]) for one in uncounted]
+    assert not [one for one in told if "Array" in one or "Floats" in one]

@@ -25,7 +25,7 @@ from crossbody.engines.mujoco import _build as build
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Strings
 from crossbody.engines.pinocchio.scene import Gaps, spans, tree
-from crossbody.reference.tree import mechanism, switches
+from crossbody.reference.tree import mechanism, quantities, switches
 from crossbody.reference.tree.table import tabulate
 
 SEEDS = range(40)
@@ -37,7 +37,7 @@ def ours(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
     table = tabulate(scene)
     M, f, e = np.full((scene.nv, scene.nv), np.nan), np.full(scene.nv, np.nan), np.full(2, np.nan)
     mechanism.dynamics(0.0, q, v, u, table.p, M, f, np.full(table.scratch, np.nan))
-    mechanism.energy(q, v, table.p, e)
+    quantities.energy(q, v, table.p, e)
     return M, f, e
 
 
@@ -81,9 +81,9 @@ def test_forces_do_the_work_that_the_energy_says(seed: int) -> None:
     q, v, u = random_state(scene, rng)
     M, f, _ = ours(scene, q, v, u)
     vd, step, e = np.linalg.solve(M, f), 1e-30, np.zeros(2, dtype=complex)
-    mechanism.energy(q + 1j * step * rates(scene, q, v), v + 1j * step * vd, table.p.astype(complex), e)
+    quantities.energy(q + 1j * step * rates(scene, q, v), v + 1j * step * vd, table.p.astype(complex), e)
     power = np.zeros(2)
-    mechanism.power(0.0, q, v, u, table.p, power)
+    quantities.power(0.0, q, v, u, table.p, power)
     assert close(e.imag.sum() / step, power[0] - power[1])
 
 
@@ -95,7 +95,7 @@ def _constants(kernel: Any) -> str:
 
 @pytest.mark.parametrize("paired", [False, True])
 def test_only_scenes_whose_shapes_may_meet_compile_how_they_do(paired: bool) -> None:
-    system, made = system_of(case_of(BALL.replace(pairs=BALL.pairs * paired))), mechanism.row_kernels(paired)
+    system, made = system_of(case_of(BALL.replace(pairs=BALL.pairs * paired))), quantities.row_kernels(paired)
     assert (system.gaps, system.rows) == (made["gaps"], made["rows"])
     kernels = [*made.values(), switches.switching_kernels(paired)["switch"]]
     assert {"pair_rows5touch" in _constants(kernel) for kernel in kernels} == {paired}
@@ -116,7 +116,7 @@ def test_rows_belong_to_their_gaps(seed: int, paired: bool) -> None:
     w = np.zeros(table.scratch)
     still = np.zeros(len(scene.inputs))
     mechanism.dynamics(0.0, q, v, still, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
-    rows, gaps = (mechanism.row_kernels(paired)[name] for name in ("rows", "gaps"))
+    rows, gaps = (quantities.row_kernels(paired)[name] for name in ("rows", "gaps"))
     rows(0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     moved = [np.zeros(count, dtype=complex) for _ in range(2)]
     gaps(0.0, q + 1j * step * rates(scene, q, v), v.astype(complex), table.p.astype(complex), *moved)

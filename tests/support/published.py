@@ -21,7 +21,7 @@ from crossbody.cases.scene_rows import rows_of
 from crossbody.engines._scene import Forces
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio.scene import Gaps, spans, tree
-from crossbody.reference.tree import mechanism
+from crossbody.reference.tree import mechanism, quantities
 from crossbody.reference.tree.table import tabulate
 
 SAME = 1e-10
@@ -127,7 +127,7 @@ def rows_as_in_pinocchio(model: Any, scene: Scene) -> None:
         assert close(gaps, gap, 1.0)
         assert close(H[sure], to.velocities(r, rows)[sure], 1.0)
         mechanism.velocity(0.0, q, v, table.p, qd)
-        mechanism.row_kernels(True)["gaps"](0.0, q + 1j * step * qd, v.astype(complex), table.p.astype(complex), *h)
+        quantities.row_kernels(True)["gaps"](0.0, q + 1j * step * qd, v.astype(complex), table.p.astype(complex), *h)
         size = np.maximum(1.0, np.abs(H).max(axis=1)) * np.abs(v).max() ** 2
         off = np.abs(h[1].imag / step - Hdv)
         known = sure & np.isfinite(off)  # a row of two middles that meet has no direction

@@ -10,7 +10,7 @@ import numpy as np
 from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_rows import rows_of
 from crossbody.engines.mujoco import _build as build
-from crossbody.reference.tree import mechanism
+from crossbody.reference.tree import mechanism, quantities
 from crossbody.reference.tree.table import tabulate
 
 BALL = Scene(
@@ -37,5 +37,5 @@ def rows_at(scene: Scene, q: Any, v: Any, u: Any) -> tuple[Any, Any, Any]:
     count, table = len(rows_of(scene)[0]), tabulate(scene)
     H, h, Hdv, w = np.zeros((count, scene.nv)), np.zeros(count), np.zeros(count), np.zeros(table.scratch)
     mechanism.dynamics(0.0, q, v, u, table.p, np.zeros((scene.nv, scene.nv)), np.zeros(scene.nv), w)
-    mechanism.row_kernels(True)["rows"](0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
+    quantities.row_kernels(True)["rows"](0.0, q, v, table.p, w, np.arange(count), count, H, h, Hdv)
     return H, h, Hdv
