@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Case, Trajectory
+from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.contacts import Contact, contacts, rates
+from crossbody.cases.contacts import CLOSED, Contact, contacts, rates
 from crossbody.reports.measuring.alignment import aligned, matched
 from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import guard, turned
@@ -54,24 +54,21 @@ def event_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
     pairs, rows = matched(truth, run), case.law.unilateral
     gap = KNOWN * _widest(truth.trajectory, rows)
     push = KNOWN * float(np.nanmax(np.abs(truth.trajectory.lam[:, rows]), initial=0.0))
-    shifts = [off(truth, a.touch, b.touch, _of_row("gap", a.row), gap) for a, b in pairs]
+    shifts = [off(truth, a.touch, b.touch, _of_row("gap", a.row, (Mode.FREE,)), gap) for a, b in pairs]
     shifts += [_let_go(truth, a, b, push) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
     return max(shifts, default=None)
 
 
-def _of_row(signal: str, row: int) -> Callable[[Trajectory], Floats]:
-    return lambda motion: getattr(motion, signal)[:, row]
+def _of_row(signal: str, row: int, modes: tuple[Mode, ...]) -> Callable[[Trajectory], Floats]:
+    """Return the signal (n,) of a row of a motion, infinite in other modes: there others bring events about."""
+    return lambda motion: np.where(np.isin(motion.mode[:, row], modes), getattr(motion, signal)[:, row], np.inf)
 
 
 def _let_go(truth: Truth, a: Contact, b: Contact, known: float) -> float:
-    """How far a release is off, s: in full if by longer than the truth's contact lasts, before which nothing pushes.
-
-    Contacts in no time end with their touch, which tells how far they are off.
-    """
+    """How far a release is off, s; contacts in no time end with their touch, which tells how far they are."""
     if a.release == a.touch and b.release == b.touch:
         return 0.0
-    late = abs(b.release - a.release)
-    return late if late >= a.release - a.touch else off(truth, a.release, b.release, _of_row("lam", a.row), known)
+    return off(truth, a.release, b.release, _of_row("lam", a.row, CLOSED), known)
 
 
 def _widest(run: Trajectory, rows: NDArray[np.bool_]) -> float:
