@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -14,6 +14,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.remembered import remembered
 from crossbody.cases.scene_contacts import contacts
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.scale import RESTS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +28,7 @@ class Rubbing:
         slip (n, m, k): velocity of the second shape over the first along the tangential rows, m/s.
         force (n, m, k): of the first on the second, N.
         normal (n, m): N; 1 of dry friction.
+        dry (m,): whether it is dry friction.
     """
 
     rows: NDArray[np.intp]
@@ -35,6 +37,7 @@ class Rubbing:
     slip: Floats
     force: Floats
     normal: Floats
+    dry: NDArray[np.bool_]
 
     def of_pairs(self, values: Floats) -> Floats:
         """Return the sums (n, pairs, ...) of values of places (n, m, ...) over those of each pair."""
@@ -42,11 +45,17 @@ class Rubbing:
 
 
 SLOW = 1e-3  # part of the largest slip, and of the largest force, below which a direction is not looked at
+BOUND, SLIP = 1e-6, 1e-5  # of the largest bound and slip: to what limits hold friction and velocities
 SHORT = 1e-6  # m, or rad, to which positions are judged: a slide is not known to be one if it is shorter
 
 
-@remembered(4)  # every metric asks for the same
+@remembered(4)
 def rubbing(run: Trajectory, case: Case) -> Rubbing | None:
+    """Return where a motion may slip, kept since every metric asks for the same; None without friction."""
+    return rubbed(run, case)
+
+
+def rubbed(run: Trajectory, case: Case) -> Rubbing | None:
     """Return where a motion may slip; None where no contact has friction."""
     system = equations(case)
     if system is None or not system.frictional:
@@ -61,6 +70,7 @@ def rubbing(run: Trajectory, case: Case) -> Rubbing | None:
     return Rubbing(
         rows=rows, pair=_pairs(case, len(rows)), mu=system.friction[rows], slip=there * rates[:, tangents],
         force=there * run.lam[:, tangents], normal=np.where(system.dry[rows], 1.0, run.lam[:, rows]),
+        dry=system.dry[rows],
     )  # fmt: skip
 
 
@@ -96,20 +106,53 @@ def cumulated(run: Trajectory, values: Floats) -> Floats:
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(pieces, axis=0)])
 
 
-def changes(run: Trajectory, found: Rubbing) -> Iterator[tuple[float, bool]]:
-    """Yield when a pair begins to slide, and when all of its places that touch hold: instant, and whether it slides.
+def turned(run: Trajectory, case: Case) -> tuple[tuple[int, float, bool], ...]:
+    """Return every change of a motion, as `changes` tells them; none without friction."""
+    found = rubbing(run, case)
+    return () if found is None else tuple(changes(run, found))
+
+
+def guard(truth: Trajectory, case: Case, pair: int, slides: bool) -> tuple[Callable[[Trajectory], Floats], float]:
+    """Return what comes to zero where a pair begins to slide, N, or to hold, m/s or rad/s, and to what it is known.
+
+    The one is what friction that holds is below its bound, the other the slip; infinite where nothing holds or touches.
+    """
+    exact = rubbing(truth, case)
+    assert exact is not None
+    own = exact.pair == pair
+    like = exact.dry == exact.dry[own][0]
+    if slides:
+        known = BOUND * float(np.max(exact.mu * exact.normal * like, initial=0.0))
+    else:
+        known = SLIP * max(float(np.max(np.linalg.norm(exact.slip, axis=-1) * like, initial=0.0)), RESTS)
+
+    def values(run: Trajectory) -> Floats:
+        found = rubbed(run, case)
+        assert found is not None
+        mode = run.mode[:, found.rows]
+        below: Floats = found.mu * found.normal - np.linalg.norm(found.force, axis=-1)
+        touches = np.isin(mode, (Mode.STICK, Mode.SLIP)) & own
+        least: Floats = np.where((mode == Mode.STICK) & own, below, np.inf).min(axis=1)
+        fastest: Floats = np.where(touches, np.linalg.norm(found.slip, axis=-1), -np.inf).max(axis=1)
+        return least if slides else fastest
+
+    return values, known
+
+
+def changes(run: Trajectory, found: Rubbing) -> Iterator[tuple[int, float, bool]]:
+    """Yield when pairs begin to slide, and when all places that touch hold: pair, instant, and whether it slides.
 
     What it did when it touched last counts where it comes off in between. A slide shorter than SHORT is none.
     """
     for pair in np.unique(found.pair):
         places = np.flatnonzero(found.pair == pair)
         begun = float(run.t[0]) if len(run.t) else 0.0
-        pending: list[tuple[float, bool]] = []
+        pending: list[tuple[int, float, bool]] = []
         for t, slides in _switches(run, found.rows[places].tolist()):
             if slides:
-                begun, pending = t, [(t, True)]
+                begun, pending = t, [(pair, t, True)]
             elif _way(run, found, places, begun, t) > SHORT:
-                yield from (*pending, (t, False))
+                yield from (*pending, (pair, t, False))
                 pending = []
         if pending and _way(run, found, places, begun, float(run.t[-1])) > SHORT:
             yield from pending

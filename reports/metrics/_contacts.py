@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
-from crossbody.cases import Case, Trajectory
-from crossbody.cases.contacts import Contact, contacts, rates
+from crossbody.cases import Case, Mode, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.cases.contacts import CLOSED, Contact, contacts, rates
 from crossbody.reports.measuring.alignment import aligned, matched
 from crossbody.reports.measuring.equations import equations, finite, spread
+from crossbody.reports.measuring.friction import guard, turned
 from crossbody.reports.measuring.impulse import away
+from crossbody.reports.measuring.instants import off
 from crossbody.reports.measuring.truth import Truth
 
-UNITS = {"constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m"}
+UNITS = {
+    "constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m",
+    "slip_times": "s", "stick_times": "s",
+}  # fmt: skip
 NEEDS: dict[str, str] = {}
 ROUNDING = 1e-6
 """Part of the largest coordinate: gaps that never open beyond it are known to its tolerance alone,
 and on those below it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
+KNOWN = 1e-6
+"""Part of the largest to which limits hold gaps and what releases leave of multipliers."""
 SHALLOW = 1e-12
 """Penetration below this part of the largest gap is rounding: collisions that take no time do not penetrate."""
 
@@ -35,16 +45,36 @@ def constraint_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
 def event_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Instants of touch and release against the truth's, matched in order.
 
-    Max |t - t_truth| over matched touches and releases, s; None where nothing touches. A contact that the
-    run or the truth does not have is not here: it is a difference in the metric contacts. NaN where an event
-    of the run has no instant.
+    Max |t - t_truth| over matched touches and releases, s, or less where the gap, or the multiplier, comes near
+    zero slowly (`measuring.instants`); None where nothing touches. A contact that the run or the truth does not
+    have is not here: it is a difference in the metric contacts. NaN where an event of the run has no instant.
     """
     if np.isnan([event.t for event in run.events]).any():
         return math.nan
-    pairs = matched(truth, run)
-    shifts = [abs(b.touch - a.touch) for a, b in pairs]
-    shifts += [abs(b.release - a.release) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+    pairs, rows = matched(truth, run), case.law.unilateral
+    gap = KNOWN * _widest(truth.trajectory, rows)
+    push = KNOWN * float(np.nanmax(np.abs(truth.trajectory.lam[:, rows]), initial=0.0))
+    shifts = [off(truth, a.touch, b.touch, _of_row("gap", a.row, (Mode.FREE,)), gap) for a, b in pairs]
+    shifts += [_let_go(truth, a, b, push) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
     return max(shifts, default=None)
+
+
+def _of_row(signal: str, row: int, modes: tuple[Mode, ...]) -> Callable[[Trajectory], Floats]:
+    """Return the signal (n,) of a row of a motion, infinite in other modes: there others bring events about."""
+    return lambda motion: np.where(np.isin(motion.mode[:, row], modes), getattr(motion, signal)[:, row], np.inf)
+
+
+def _let_go(truth: Truth, a: Contact, b: Contact, known: float) -> float:
+    """How far a release is off, s; contacts in no time end with their touch, which tells how far they are."""
+    if a.release == a.touch and b.release == b.touch:
+        return 0.0
+    return off(truth, a.release, b.release, _of_row("lam", a.row, CLOSED), known)
+
+
+def _widest(run: Trajectory, rows: NDArray[np.bool_]) -> float:
+    """Return what gaps of rows are measured by, m or rad: the largest."""
+    least = ROUNDING * float(np.max(np.abs(run.q), initial=0.0))
+    return max(float(np.max(np.abs(run.gap[:, rows]), initial=0.0)), least)
 
 
 def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -58,10 +88,9 @@ def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if not rows.any() or not inside.any():
         return None
     smooth = away(exact, [switch.t for switch in truth.trajectory.switches if not switch.smooth], case.t_end)
-    off = float(np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], initial=0.0))
-    scale = float(np.max(np.abs(truth.trajectory.gap[:, rows])))
-    scale = max(scale, ROUNDING * float(np.max(np.abs(truth.trajectory.q), initial=0.0)))
-    return off / scale if scale else off
+    apart = float(np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], initial=0.0))
+    scale = _widest(truth.trajectory, rows)
+    return apart / scale if scale else apart
 
 
 def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -78,8 +107,8 @@ def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
     some = spread(run)
     wanted = system.gaps_along(run.q[some], 0.0 * run.v[some])[0]
     scale = max(float(np.max(np.abs(wanted))), ROUNDING * float(np.max(np.abs(run.q[some]))))
-    off = float(np.max(np.abs(run.gap[some] - wanted)))
-    return off / scale if scale else off
+    apart = float(np.max(np.abs(run.gap[some] - wanted)))
+    return apart / scale if scale else apart
 
 
 def mode_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -159,6 +188,33 @@ def restitution_error(truth: Truth, run: Trajectory, case: Case) -> float | None
     """
     pairs = zip(rates(truth.trajectory), rates(run), strict=False)
     return max((abs(out / into - b_out / b_into) for (_, b_into, b_out), (_, into, out) in pairs), default=None)
+
+
+def slip_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Instants at which shapes that held begin to slide, against the truth's.
+
+    Max |t - t_truth|, s, or less where friction comes near its bound slowly (`measuring.instants`); None where the
+    truth has none, or the run has not the same pairs in the same order.
+    """
+    return _turned(truth, run, case, slides=True)
+
+
+def stick_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Instants at which shapes that slid hold, against the truth's.
+
+    Max |t - t_truth|, s, or less where the slip comes near zero slowly (`measuring.instants`); None where the
+    truth has none, or the run has not the same pairs in the same order.
+    """
+    return _turned(truth, run, case, slides=False)
+
+
+def _turned(truth: Truth, run: Trajectory, case: Case, slides: bool) -> float | None:
+    """How far pairs are off that begin to slide, or hold, at most, s."""
+    pairs, mine = ([one[:2] for one in turned(each, case) if one[2] == slides] for each in (truth.trajectory, run))
+    if not pairs or [pair for pair, _ in pairs] != [pair for pair, _ in mine]:
+        return None
+    guarded = {pair: guard(truth.trajectory, case, pair, slides) for pair, _ in pairs}
+    return float(np.max([off(truth, t, found, *guarded[k]) for (k, t), (_, found) in zip(pairs, mine, strict=True)]))
 
 
 def touch_count(truth: Truth, run: Trajectory, case: Case) -> float | None:

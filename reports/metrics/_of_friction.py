@@ -6,13 +6,13 @@ import numpy as np
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.reports.measuring.friction import changes, cumulated, rubbing, sliding
+from crossbody.reports.measuring.friction import cumulated, rubbing, sliding
 
 UNITS = {
     "creep_speed": "m/s", "friction_angle": "rad", "friction_impulse": "N s", "friction_power": "W",
-    "friction_work": "J", "slip_times": "s", "stick_times": "s",
+    "friction_work": "J",
 }  # fmt: skip
-KINDS = {"friction_impulse": "signal", "friction_work": "signal", "slip_times": "instants", "stick_times": "instants"}
+KINDS = {"friction_impulse": "signal", "friction_work": "signal"}
 """How a function is compared with the truth's, as in `CaseMetric`; the others are numbers of the run alone."""
 ALWAYS = True
 
@@ -62,18 +62,3 @@ def friction_work(run: Trajectory, case: Case) -> Floats | None:
     """Work of friction of every pair of shapes since the start, against the truth's."""
     found = rubbing(run, case)
     return None if found is None else cumulated(run, found.of_pairs(np.sum(found.force * found.slip, axis=-1)))
-
-
-def slip_times(run: Trajectory, case: Case) -> Floats:
-    """Instants at which shapes that held begin to slide, against the truth's."""
-    return _instants(run, case, slides=True)
-
-
-def stick_times(run: Trajectory, case: Case) -> Floats:
-    """Instants at which shapes that slid hold, against the truth's."""
-    return _instants(run, case, slides=False)
-
-
-def _instants(run: Trajectory, case: Case, slides: bool) -> Floats:
-    found = rubbing(run, case)
-    return np.zeros(0) if found is None else np.array([t for t, now in changes(run, found) if now == slides])
