@@ -49,7 +49,9 @@ def show() -> int:
     entries = store.entries() if store else []
     size = sum(found.st_size for _, found in entries)
     if voice.as_json():
-        print(json.dumps({"folder": str(where), "usable": store is not None, "files": len(entries), "bytes": size}))
+        voice.result(
+            json.dumps({"folder": str(where), "usable": store is not None, "files": len(entries), "bytes": size})
+        )
     else:
         print(f"{where}: {len(entries)} files, {size / 1e6:.1f} MB" + ("" if store else " (not used)"))
     return 0
@@ -60,7 +62,7 @@ def clear() -> int:
     store = code_store.current()
     removed = store.clear() if store else 0
     if voice.as_json():
-        print(json.dumps({"removed": removed}))
+        voice.result(json.dumps({"removed": removed}))
     elif not voice.quiet():
         print(f"Removed {removed} files of compiled code; the next run compiles again.")
     return 0
