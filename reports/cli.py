@@ -422,6 +422,8 @@ def _obey(arguments: list[str] | None) -> int:
             return 130
         if told := installed.sentence(error):
             return _say(told)
+        if isinstance(error, FileNotFoundError) and _nowhere():
+            return _say("The folder that the command was given in has been removed; change to another one.")
         if isinstance(error, OSError) and error.errno in REFUSED:
             _drop_what_cannot_be_printed()
             return _say(f"The system refuses: {error.strerror}{f' ({error.filename})' if error.filename else ''}.")
@@ -435,6 +437,14 @@ REFUSED = (
     errno.EBUSY, errno.ETXTBSY,
 )  # fmt: skip
 """What the system may refuse whatever a program does, paths that a user gave among it."""
+
+
+def _nowhere() -> bool:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _drop_what_cannot_be_printed() -> None:

@@ -25,7 +25,7 @@ from numba.core import types
 from crossbody.reference import cache, code_store, kernels
 from crossbody.reference.cache import Compiled, compiled
 from crossbody.reference.code_store import CODE, LOCK, Store
-from crossbody.reports.cli import cli
+from crossbody.reports.cli import cli, main
 
 ROOT = os.name == "posix" and os.geteuid() == 0
 PROGRAM = """
@@ -471,6 +471,33 @@ def test_the_command_shows_and_clears(folder):
     assert f"{folder}: 1 files" in run.invoke(cli, ["cache"]).output
     assert json.loads(run.invoke(cli, ["cache", "clear", "--json"]).output) == {"removed": 1}
     assert not list(folder.iterdir())
+
+
+def test_the_command_says_what_it_cannot_clear(folder, monkeypatch, capsys):
+    """As in a folder that another user has filled: nothing is said to be removed that is still there."""
+    _value(_kernel(30.0))
+    monkeypatch.setattr(Path, "unlink", lambda path: os.unlink(folder / "absent"))
+    with pytest.raises(SystemExit) as end:
+        main(["cache", "clear"])
+    told = capsys.readouterr()
+    assert (end.value.code, told.out) == (2, "")
+    assert told.err == f"crossbody: 1 file of {folder} cannot be removed (0 were): the folder must be writable.\n"
+
+
+def test_where_nothing_can_be_kept_the_command_says_so(tmp_path, monkeypatch, capsys):
+    """A file in the way of the folder, and a home that nobody has."""
+    (tmp_path / "file").touch()
+    for place, shown, why in (
+        (str(tmp_path / "file"), f"{tmp_path / 'file' / 'compiled'}", f"{tmp_path / 'file'} is a file"),
+        ("~no such user/cache", None, "there is no such home folder"),
+    ):
+        monkeypatch.setenv("CROSSBODY_CACHE", place)
+        with pytest.raises(SystemExit) as end:
+            main(["cache", "show", "--json"])
+        told = capsys.readouterr()
+        assert json.loads(told.out) == {"folder": shown, "usable": False, "files": 0, "bytes": 0}
+        assert end.value.code == 0
+        assert f"({why}); every process compiles anew. Set CROSSBODY_CACHE to another folder." in told.err
 
 
 def test_a_folder_in_place_of_a_file_is_told_and_written_over(folder, capsys):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +15,7 @@ from crossbody.cases import UnknownName
 from crossbody.cases.errors import NoFile
 from crossbody.reports.cli import main
 
+LISTED = "from crossbody.reports.cli import main; main(['list'])"
 THERE = "Did you mean 'arm.xml'? Known: arm.xml, hand.xml."
 
 
@@ -42,7 +47,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("run bouncing_ball.py", "There is no case file 'bouncing_ball.py'. Did you mean 'bouncing_ball'?"),
         ("run arm.xml --ctrl u.csv", "There is no table of controls 'u.csv'. Known: empty.csv."),
         ("run arm.xml --ctrl empty.csv", "Controls empty.csv: No columns to parse from file; valid: a table with "),
-        ("run arm.xml --control pid.py:Pid --tick 1", "There is no controller file 'pid.py'; there is no other *.py in"),
+        ("run arm.xml --control pid.py:Pid --tick 1", "There is no controller file 'pid.py'; there is no other *.py"),
         ("analyse delta_impulse --at z", "--at 'z' is not name=value, for example --at z=0.4."),
         ("list mujco", "There is no case or engine 'mujco'. Did you mean 'mujoco'? Known: ball_maze,"),
     ],
@@ -66,3 +71,22 @@ def test_of_a_full_folder_some_files_are_named() -> None:
         Path(f"{number:03}.urdf").touch()
     told = str(NoFile("robot file", Path("x.urdf")))
     assert told.endswith("018.urdf, 019.urdf.")
+
+
+def test_in_a_folder_that_is_gone_what_needs_none_is_done_and_the_rest_is_told(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("gone").mkdir()
+    words = "cd gone && rmdir ../gone && exec " + shlex.join([sys.executable, "-c", LISTED])
+    done = subprocess.run(["sh", "-c", words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "bouncing_ball" in done.stdout
+    Path("below").rename("gone")
+    os.chdir("gone")
+    os.rmdir("../gone")
+    with pytest.raises(SystemExit) as end:
+        main(["run", "bouncing_ball", "--variant", "linear", "-e", "reference:compiled", "--out", "out"])
+    assert end.value.code == 2
+    assert capsys.readouterr().err.endswith(
+        "crossbody: The folder that the command was given in has been removed; change to another one.\n"
+    )
