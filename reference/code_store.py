@@ -29,7 +29,8 @@ try:
 except ImportError:  # not a POSIX system: every process compiles for itself
     fcntl = None  # type: ignore[assignment]
 
-MAGIC = b"crossbody compiled code 1\n"
+ANY_FORMAT = b"crossbody compiled code "
+MAGIC = ANY_FORMAT + b"1\n"
 CODE, LOCK = ".code", ".lock"
 OURS = re.compile(r"[\w.<>-]*-[0-9a-f]{32}\.(code|lock)|\.[\w.<>-]*\.part")
 UNUSED_DAYS, LARGEST = 90.0, 2 << 30  # what is kept, in days since it was last read and in bytes
@@ -145,6 +146,8 @@ class Store:
         if time.time() - found.st_mtime > _DAY:
             with suppress(OSError):
                 os.utime(path)  # it is in use: not to be pruned
+        if data.startswith(ANY_FORMAT) and not data.startswith(MAGIC):
+            return None  # whole, of another version: it is written over
         start = len(MAGIC) + hashlib.sha256().digest_size
         if data[:start] != MAGIC + _seal(name, memoryview(data)[start:]):
             self.drop(name, "was damaged")

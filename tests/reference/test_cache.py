@@ -284,12 +284,22 @@ def test_damaged_files_are_dropped_told_and_compiled_again(folder, capsys):
         elif trial < 3:
             data = data[: draw.randrange(len(data))]
         else:
-            data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+            data[draw.randrange(len(code_store.MAGIC), len(data))] ^= 1 << draw.randrange(8)
         path.write_bytes(data)
         code_store._told.clear()
         assert _value(_kernel(5.0)) == 5.0
         assert f"{path} was damaged; it is compiled again." in capsys.readouterr().err
         assert path.read_bytes() != bytes(data)
+
+
+def test_a_file_of_another_format_is_written_over_without_a_word(folder, capsys):
+    assert _value(_kernel(2.5)) == 2.5
+    (path,) = folder.iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(code_store.MAGIC, code_store.ANY_FORMAT + b"0\n", 1))
+    assert _value(_kernel(2.5)) == 2.5
+    assert path.read_bytes().startswith(code_store.MAGIC)
+    assert capsys.readouterr().err == ""
 
 
 def test_a_compilation_that_takes_long_is_told_once(monkeypatch, capsys):
