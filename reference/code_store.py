@@ -146,8 +146,10 @@ class Store:
         if time.time() - found.st_mtime > _DAY:
             with suppress(OSError):
                 os.utime(path)  # it is in use: not to be pruned
-        if data.startswith(ANY_FORMAT) and not data.startswith(MAGIC):
-            return None  # whole, of another version: it is written over
+        if data.startswith(ANY_FORMAT) and not data.startswith(MAGIC):  # whole, of another version
+            with suppress(OSError):
+                path.unlink()
+            return None
         start = len(MAGIC) + hashlib.sha256().digest_size
         if data[:start] != MAGIC + _seal(name, memoryview(data)[start:]):
             self.drop(name, "was damaged")
