@@ -42,8 +42,9 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
         times, values = _from_npz(path) if path.suffix == ".npz" else _from_table(path, names)
     except Exception as error:  # damaged, a table makes its library raise anything
         told = (str(error) or type(error).__name__).removesuffix(".")
-        wanted = ", ".join(("t", *names))
-        raise InvalidValue(f"Controls {path}: {told}; valid: a table with the columns {wanted}.") from None
+        of_npz = f"arrays t (m,) and ctrl (m, {len(names)})"
+        valid = of_npz if path.suffix == ".npz" else f"a table with the columns {', '.join(('t', *names))}"
+        raise InvalidValue(f"Controls {path}: {told}; valid: {valid}.") from None
     if values.shape != (len(times), len(names)):
         raise InvalidValue(f"Controls {path} have the shape {values.shape}; valid: ({len(times)}, {len(names)}).")
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all() and len(times) and times[0] >= 0.0):
@@ -87,7 +88,7 @@ def _check_columns(columns: list[str], names: list[str]) -> None:
             raise ValueError(f"there is no column {name!r}; it has: {', '.join(columns)}.")
     for name in columns:
         if name not in ("t", *names):
-            raise ValueError(f"the column {name!r} is no actuator's; valid: {', '.join(('t', *names))}.")
+            raise ValueError(f"the column {name!r} is no actuator's.")
 
 
 def _check_size(size: int) -> None:
