@@ -377,10 +377,10 @@ def warm() -> int:
 
 @cli.group(invoke_without_command=True)
 @click.pass_context
-def cache(context: click.Context) -> None:
+@speaks
+def cache(context: click.Context) -> int:
     """Show the folder of compiled code and its size."""
-    if context.invoked_subcommand is None:
-        context.exit(context.invoke(cache_show))
+    return _do("cache.show") if context.invoked_subcommand is None else 0
 
 
 @cache.command("show")

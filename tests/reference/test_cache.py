@@ -474,10 +474,10 @@ def test_the_command_shows_and_clears(folder):
     _value(_kernel(30.0))
     run = CliRunner()
     (path,) = folder.iterdir()
-    shown = run.invoke(cli, ["cache", "show", "--json"])
-    assert json.loads(shown.output) == {
-        "folder": str(folder), "usable": True, "files": 1, "bytes": path.stat().st_size
-    }  # fmt: skip
+    for words in (["cache", "--json"], ["cache", "show", "--json"]):
+        assert json.loads(run.invoke(cli, words).output) == {
+            "folder": str(folder), "usable": True, "files": 1, "bytes": path.stat().st_size
+        }  # fmt: skip
     assert f"{folder}: 1 files" in run.invoke(cli, ["cache"]).output
     assert json.loads(run.invoke(cli, ["cache", "clear", "--json"]).output) == {"removed": 1}
     assert not list(folder.iterdir())
