@@ -23,6 +23,7 @@ import contextlib
 import difflib
 import os
 from collections.abc import Iterable
+from typing import Any
 
 SHOWN = 80
 LISTED = 20  # files of a folder that are named at most
@@ -39,6 +40,16 @@ def shown(value: object) -> str:
 
 class CrossbodyError(Exception):
     """Wrong use, told in one sentence: what is wrong, where, and what would be valid."""
+
+    def __reduce__(self) -> Any:
+        """Return how another process makes it again: what a subclass takes is not its sentence."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[CrossbodyError], told: tuple[Any, ...], state: dict[str, Any]) -> CrossbodyError:
+    made = kind.__new__(kind, *told)
+    made.__dict__.update(state)
+    return made
 
 
 class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other names here do
