@@ -14,6 +14,7 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from os import PathLike, fspath
+from os.path import isabs
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -93,7 +94,8 @@ __all__ = [
 def _warn_of_another_checkout() -> None:
     """Say so where a folder called crossbody beside the script came before what is installed."""
     here, whole = Path(__file__).parents[1], sys.modules["crossbody"]
-    if whole.__file__ or not any(Path(place).resolve() == here.resolve() for place in whole.__path__):
+    places = [Path(place).resolve() for place in whole.__path__ if isabs(place)]  # others are no folders
+    if whole.__file__ or here.resolve() not in places:
         return  # a regular package comes before such a folder
     from importlib.metadata import PackageNotFoundError, distribution
 

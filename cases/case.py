@@ -367,8 +367,9 @@ class Case:
         count = len(self.scene.activated) if self.scene is not None else 0
         act0 = np.zeros(count) if np.size(self.act0) == 0 else self.act0
         object.__setattr__(self, "act0", frozen(f"Case {self.name}", "act0", act0, (count,)))
-        if not np.isfinite(self.act0).all():
-            raise SceneError(f"Case {self.name}: act0 is {self.act0.tolist()}; it must be finite.")
+        for name in ("q0", "v0", "act0"):
+            if not np.isfinite(start := getattr(self, name)).all():
+                raise SceneError(f"Case {self.name}: {name} is {start.tolist()}; it must be finite.")
         if len(self.law.a0) != len(self.contacts):
             raise SceneError(
                 f"Case {self.name} names {len(self.contacts)} contacts but its law has {len(self.law.a0)} rows."

@@ -2,6 +2,7 @@
 
     CrossbodyError
     +-- UnknownName         a case, engine, profile, metric or parameter that does not exist
+    |   +-- NoFile          a file that does not exist
     +-- InvalidValue        a value outside what its name admits
     +-- SceneError          a mechanism whose parts contradict each other (shapes, start, constants)
     +-- ControlError        a controller of the user's own that raises, or gives something else than its controls
@@ -18,11 +19,14 @@ Numerical failure is never an exception: it is an `Outcome`.
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import os
 from collections.abc import Iterable
+from typing import Any
 
 SHOWN = 80
+LISTED = 20  # files of a folder that are named at most
 
 
 def shown(value: object) -> str:
@@ -37,6 +41,16 @@ def shown(value: object) -> str:
 class CrossbodyError(Exception):
     """Wrong use, told in one sentence: what is wrong, where, and what would be valid."""
 
+    def __reduce__(self) -> Any:
+        """Return how another process makes it again: what a subclass takes is not its sentence."""
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[CrossbodyError], told: tuple[Any, ...], state: dict[str, Any]) -> CrossbodyError:
+    made = kind.__new__(kind, *told)
+    made.__dict__.update(state)
+    return made
+
 
 class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other names here do
     """A name that nobody knows; the message lists those that exist.
@@ -49,9 +63,43 @@ class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(sorted(known))
-        close = difflib.get_close_matches(name, self.known, n=1) if isinstance(name, str) else ()
-        hint = f" Did you mean {close[0]!r}?" if close else ""
-        super().__init__(f"There is no {kind} {shown(name)}.{hint} Known: {', '.join(self.known) or 'none'}.")
+        stems = {_stem(one): one for one in self.known}
+        close = difflib.get_close_matches(_stem(name), stems, n=1) if isinstance(name, str) else ()
+        hint = f" Did you mean {stems[close[0]]!r}?" if close else ""
+        others = f"Known: {', '.join(self.known)}." if self.known else "There are none."
+        super().__init__(f"There is no {kind} {shown(name)}.{hint} {others}")
+
+
+def _stem(name: str) -> str:
+    """Return what tells names apart: of the path of a file neither folder nor suffix."""
+    return os.path.splitext(os.path.basename(name))[0]
+
+
+class NoFile(UnknownName):
+    """A file that is not there; the message lists those that are, of the same suffix in the same folder.
+
+    Args:
+        kind: what it would hold, for example "robot file".
+        path: that was given.
+        known: names that may stand in its place.
+    """
+
+    def __init__(self, kind: str, path: str | os.PathLike[str], known: Iterable[str] = ()) -> None:
+        text = os.fspath(path)
+        folder, name = os.path.split(text)
+        suffix = os.path.splitext(name)[1]
+        with contextlib.suppress(OSError, ValueError), os.scandir(folder or os.curdir) as found:
+            beside = sorted(one.name for one in found if suffix and one.name.endswith(suffix) and one.is_file())
+            known = (*known, *beside[:LISTED])
+        super().__init__(kind, name, known)
+        told = str(self).partition(f"{shown(name)}")[2]
+        if os.path.exists(text):
+            told = ": it is a folder, a pipe or a device."
+        elif folder and not os.path.isdir(folder):
+            told = f": there is no folder {folder!r}."
+        elif not self.known:
+            told = f"; there is no other *{suffix} in its folder." if suffix else "; valid: the path of a file."
+        self.name, self.args = text, (f"There is no {kind} {text!r}{told}",)
 
 
 class InvalidValue(CrossbodyError, ValueError):  # noqa: N818

@@ -13,7 +13,7 @@ one works in names, or of the nearest folder above it:
     [tool.crossbody]
     plugins = ["engines/euler.py"]  # from the folder of the pyproject.toml
 
-A plug-in is called like its file, and is of every kind whose public names it has (`KINDS`).
+A plug-in is called like its file, and is of every kind whose public names it has (`public_names`).
 """
 
 from __future__ import annotations
@@ -30,39 +30,26 @@ from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from crossbody.cases import arguments
-from crossbody.cases.errors import CrossbodyError, InvalidValue, SceneError, UnknownName, shown
+from crossbody.cases.errors import CrossbodyError, InvalidValue, NoFile, SceneError, shown
+from crossbody.cases.public_names import KINDS, check, groups_of, what_is_missing
 
 _Made = TypeVar("_Made")
 
-
-class Kind(NamedTuple):
-    """What plug-ins of one group are called, and the public names that make a module one."""
-
-    name: str
-    defines: tuple[str, ...]
-
-
-KINDS = {
-    "crossbody.cases": Kind("case", ("PARAMETERS", "VARIANTS", "build")),
-    "crossbody.engines": Kind("engine", ("ENGINE",)),
-    "crossbody.engines.importers": Kind("importer", ("FORMATS", "PACKAGE", "MODULE", "open_robot")),
-    "crossbody.hw.formats": Kind("log format", ("SUFFIXES", "Options", "recognises", "open_log")),
-    "crossbody.hw.models": Kind("model", ("MODEL",)),
-    "crossbody.reports.metrics": Kind("metric", ("UNIT", "CLAIMED", "measure")),
-    "crossbody.reports.scenes": Kind("picture", ("stage", "poses", "arrows")),
-    "crossbody.reports.sections": Kind("study", ("TITLE", "sections")),
-    "crossbody.reports.suites": Kind("suite", ("SUITE",)),
-}
-"""Group -> the kind of its plug-ins."""
 _FILES: dict[Path, ModuleType] = {}
+_OWN: dict[str, str] = {}
+"""File of a user's own that was imported -> what it is called in messages."""
+OURS = tuple(
+    str(Path(__file__).parents[1] / folder / "_")[:-1] for folder in ("cases", "engines", "hw", "reference", "reports")
+)
+"""How the paths of crossbody's own modules begin; a checkout may hold an environment with other libraries too."""
 
 
 def modules(group: str) -> Mapping[str, str]:
     """Return the module of each plug-in by its name; what entry points name is not imported."""
-    own = {path.stem: module.__name__ for path, module in _FILES.items() if group in _groups(module)}
+    own = {path.stem: module.__name__ for path, module in _FILES.items() if group in groups_of(module)}
     return {**_entry_points(group), **own}
 
 
@@ -91,17 +78,13 @@ def version(name: str) -> str:
     return stated[1] if stated else found.version
 
 
-def _groups(module: ModuleType) -> list[str]:
-    return [group for group, kind in KINDS.items() if all(hasattr(module, name) for name in kind.defines)]
-
-
 def use(files: Iterable[str | os.PathLike[str]]) -> None:
     """Import files as plug-ins of this process; one that it has already is left as it is.
 
     Raises:
-        InvalidValue: for a path that is no Python file, a file that defines no plug-in, or a name
-            that is taken.
-        SceneError: if a file cannot be imported, with the line.
+        NoFile: for a path at which there is none.
+        InvalidValue: for a file of another kind, one that defines no plug-in, or a name that is taken.
+        SceneError: if a file cannot be imported, with the line, or what it defines is not valid.
     """
     for file in files:
         path = Path(arguments.path("plug-in", file)).expanduser().resolve()
@@ -113,27 +96,27 @@ def _opened(path: Path) -> ModuleType:
     if path.suffix != ".py" or not path.stem.isidentifier():
         raise InvalidValue(f"The plug-in {path} is not called NAME.py, with a NAME of letters, digits and _.")
     if not os.path.isfile(path):
-        raise InvalidValue(f"There is no plug-in file {path}.")
+        raise NoFile("plug-in file", path)
     if same := [other for other in _FILES if other.stem == path.stem]:
         raise InvalidValue(f"The plug-ins {same[0]} and {path} have one name: rename one of the files.")
     module = from_file("plugin", path)
     try:
-        _check(path, _groups(module))
-    except InvalidValue:
+        _check(path, module)
+    except CrossbodyError:
         del sys.modules[module.__name__]
         raise
     return module
 
 
-def _check(path: Path, groups: list[str]) -> None:
-    if not groups:
-        wanted = "; ".join(f"{kind.name}: {', '.join(kind.defines)}" for kind in KINDS.values())
-        raise InvalidValue(f"The plug-in file {path} defines none. Public names of a plug-in, by its kind: {wanted}.")
+def _check(path: Path, module: ModuleType) -> None:
+    if not (groups := groups_of(module)):
+        raise InvalidValue(f"The plug-in file {path} {what_is_missing(module)}")
     for group in groups:
         package = f"{group}.library" if group == "crossbody.cases" else group
         taken = find_spec(f"{package}.{path.stem}") or path.stem in getattr(sys.modules[package], "OWN", ())
         if taken or path.stem in _entry_points(group):
             raise InvalidValue(f"The {KINDS[group].name} {path.stem!r} is there already: rename the plug-in {path}.")
+        check(module, group)
 
 
 def configured(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
@@ -189,14 +172,15 @@ def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
         known: names that would be valid in its place.
 
     Raises:
-        UnknownName: if it is not there.
+        NoFile: if it is not there.
         SceneError: if it cannot be imported, with the line.
     """
     spec = importlib.util.spec_from_file_location(f"crossbody_{kind}_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise UnknownName(f"{kind} file", str(path), known)
+        raise NoFile(f"{kind} file", path, known)
     loaded = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = loaded  # dataclasses look their module up there
+    _OWN[str(path.absolute())] = f"{kind.replace('plugin', 'plug-in')} file {path}"
     try:
         spec.loader.exec_module(loaded)
     except (CrossbodyError, KeyboardInterrupt):
@@ -204,17 +188,40 @@ def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
         raise
     except (Exception, SystemExit) as error:
         del sys.modules[spec.name]
-        raise SceneError(_failed(kind, path, error)) from error
+        raise SceneError(_failed(path, error)) from error
     return loaded
 
 
-def _failed(kind: str, path: Path, error: BaseException) -> str:
+def _failed(path: Path, error: BaseException) -> str:
     """Why a file of a user's own cannot be imported, and the last of its lines that was reached."""
+    file, line, why = str(path), _line_in(str(path.absolute()), error), str(error)
     if isinstance(error, SyntaxError):
-        file, line, why = error.filename or str(path), error.lineno, error.msg
-    else:
-        own = [frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename) == path.absolute()]
-        file, line, why = str(path), own[-1].lineno if own else None, str(error)
+        file, line, why = error.filename or file, error.lineno, error.msg
     where = file if line is None else f"{file}, line {line}"
-    what = type(error).__name__
-    return f"The {kind} file {path} cannot be imported: {what}{f' ({why[:300]})' if why else ''} in {where}."
+    return f"The {_OWN[str(path.absolute())]} cannot be imported: {_what(error, why)} in {where}."
+
+
+def _line_in(file: str, error: BaseException) -> int | None:
+    own = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    return own[-1] if own else None
+
+
+def _what(error: BaseException, why: str) -> str:
+    return f"{type(error).__name__}{f' ({why[:300]})' if why else ''}"
+
+
+def sentence(error: BaseException) -> str | None:
+    """Return what goes wrong in a file of a user's own, with the line; None for a fault that is not its.
+
+    Wrong use is told in its own words. Any other error is the file's if neither crossbody's code nor that of
+    another file of this kind was called from the last of its lines.
+    """
+    frames = [frame.filename for frame in traceback.extract_tb(error.__traceback__)]
+    own = [file for file in frames if file in _OWN]
+    if isinstance(error, CrossbodyError):
+        where = f" It was raised in {own[-1]}, line {_line_in(own[-1], error)}." if own else ""
+        return f"{error}{where}"
+    last = next((file for file in reversed(frames) if file in _OWN or file.startswith(OURS)), "")
+    if last not in _OWN:
+        return None
+    return f"The {_OWN[last]} raises {_what(error, str(error))} in line {_line_in(last, error)}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from crossbody.cases.errors import CrossbodyError, InvalidValue, SceneError, Unk
 from crossbody.cases.files.case import UNNAMED, case_of, open_file
 from crossbody.cases.files.reading import SUFFIXES as ROBOT_FILES
 from crossbody.cases.installed import from_file
+from crossbody.cases.public_names import check
 from crossbody.cases.scene import Scene
 
 OF_USERS = (".py", *ROBOT_FILES)  # how the paths of files with cases of users' own end
@@ -43,10 +45,13 @@ def module(name: str) -> Any:
     """What defines a case: a plug-in or an installed one by its name, a user's own or a robot's file by its path."""
     if name.endswith(ROBOT_FILES):
         return open_file(name)
-    found = from_file("case", Path(name), cases.names()) if name.endswith(".py") else cases.REGISTRY.load(name)
-    for wanted in ("PARAMETERS", "VARIANTS", "build"):
-        if not hasattr(found, wanted):
-            raise SceneError(f"Case file {found.__file__} does not define {wanted}.")
+    if not name.endswith(".py"):
+        if name not in cases.names() and (os.path.exists(name) or os.path.splitext(name)[1]):
+            endings = ", ".join(OF_USERS)
+            raise InvalidValue(f"The case {shown(name)} is no case file; the path of one ends in {endings}.")
+        return cases.REGISTRY.load(name)
+    found = from_file("case", Path(name), cases.names())
+    check(found, "crossbody.cases")
     return found
 
 
@@ -54,7 +59,7 @@ def resolve(
     where: str, parameters: Mapping[str, Parameter], preset: Mapping[str, Value], overrides: Mapping[str, Value]
 ) -> dict[str, Value]:
     """Every parameter's value: default, then the variant's, then the user's."""
-    for name in overrides:
+    for name in (*preset, *overrides):
         if name not in parameters:
             raise UnknownName(f"parameter of {where}", name, parameters)
     given = {**preset, **overrides}

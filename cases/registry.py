@@ -20,6 +20,7 @@ from types import ModuleType
 
 from crossbody.cases import installed
 from crossbody.cases.errors import UnknownName
+from crossbody.cases.public_names import check
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +53,16 @@ class Registry:
 
         Raises:
             UnknownName: if there is no such plug-in.
+            SceneError: if it is installed, and lacks a public name of its kind or has a wrong one.
         """
         if isinstance(name, str) and name in self.own():
             return importlib.import_module(f"{self.package}.{name}")
         module = self._installed().get(name) if isinstance(name, str) else None
         if module is None:
             raise UnknownName(self.kind, name, self.names())
-        return importlib.import_module(module)
+        found = importlib.import_module(module)
+        check(found, self.group or self.package)
+        return found
 
     def summary(self, name: str) -> str:
         """Return a plug-in's first line without importing it; of an installed one its origin."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from crossbody.cases.arguments import instance
 from crossbody.cases.arrays import Bytes, Floats, frozen
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.cases.outcome import Outcome
@@ -146,6 +147,7 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Check every shape once and make every array read-only."""
+        instance("Trajectory.outcome", self.outcome, Outcome, "an Outcome")
         object.__setattr__(self, "t", frozen("Trajectory", "t", self.t, (None,)))
         n = len(self.t)
         object.__setattr__(self, "gap", frozen("Trajectory", "gap", self.gap, (n, None)))

@@ -5,8 +5,11 @@ An engine is a module here with one public name, `ENGINE`, an `Engine`.
 
 from __future__ import annotations
 
-from crossbody.cases import EngineUnavailable, SceneError
+from collections.abc import Mapping
+
+from crossbody.cases import EngineUnavailable
 from crossbody.cases.entry_points import checked_arguments
+from crossbody.cases.public_names import TEXT, Public, check_values, maps_to_texts
 from crossbody.cases.registry import Registry
 from crossbody.engines.contract import QUANTITIES, Engine, Run
 
@@ -32,7 +35,7 @@ def load(name: str) -> Engine:
 
     Raises:
         UnknownName: if there is no such engine; the message lists the names.
-        SceneError: if its module does not define one.
+        SceneError: if its module does not define one, or one that is incomplete.
         EngineUnavailable: if its third-party package is not installed. A broken import of our own stays loud.
     """
     try:
@@ -46,7 +49,19 @@ def load(name: str) -> Engine:
         raise EngineUnavailable(
             f"Engine {name!r} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."
         ) from None
-    engine = getattr(module, "ENGINE", None)
-    if not isinstance(engine, Engine):
-        raise SceneError(f"Engine file {module.__file__} does not define ENGINE, a crossbody.engines.Engine.")
+    engine: Engine = module.ENGINE
+    check_values(f"The engine file {module.__file__}", engine, _ATTRIBUTES, "ENGINE.")
     return engine
+
+
+_ATTRIBUTES = {
+    "name": TEXT,
+    "profiles": Public(
+        "a mapping from profiles to a sentence each", lambda value: maps_to_texts(value) and bool(value)
+    ),
+    "versions": Public("a mapping from packages to their versions", maps_to_texts),
+    "hidden": Public(
+        'a mapping from profiles ("*" for all) to mappings from quantities to reasons',
+        lambda value: isinstance(value, Mapping) and all(map(maps_to_texts, value.values())),
+    ),
+}

@@ -29,7 +29,8 @@ try:
 except ImportError:  # not a POSIX system: every process compiles for itself
     fcntl = None  # type: ignore[assignment]
 
-MAGIC = b"crossbody compiled code 1\n"
+ANY_FORMAT = b"crossbody compiled code "
+MAGIC = ANY_FORMAT + b"1\n"
 CODE, LOCK = ".code", ".lock"
 OURS = re.compile(r"[\w.<>-]*-[0-9a-f]{32}\.(code|lock)|\.[\w.<>-]*\.part")
 UNUSED_DAYS, LARGEST = 90.0, 2 << 30  # what is kept, in days since it was last read and in bytes
@@ -57,12 +58,13 @@ def base() -> Path | None:
         root = Path(given) if given else Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "crossbody"
         return root.expanduser() / "compiled"
     except RuntimeError:  # a user without a name has no home
-        tell("there is no home folder to keep compiled code in; it is compiled anew in every process. " + ADVICE)
+        why = f"in {given} (there is no such home folder)" if given else "(there is no home folder)"
+        tell(f"compiled code cannot be kept {why}; every process compiles anew. " + ADVICE)
         return None
 
 
 COMPILING = "compiling for this processor, once; it takes about half a minute."
-ADVICE = "CROSSBODY_CACHE names another folder."
+ADVICE = "Set CROSSBODY_CACHE to another folder."
 
 
 def current() -> Store | None:
@@ -79,7 +81,8 @@ def _opened(where: Path) -> Store | None:
             where.mkdir(mode=0o700, exist_ok=True)
         problem = _problem(where)
     except OSError as error:
-        tell(f"compiled code cannot be kept in {where} ({error.strerror}); every process compiles anew. " + ADVICE)
+        why = f"{error.filename} is a file" if isinstance(error, FileExistsError) else error.strerror
+        tell(f"compiled code cannot be kept in {where} ({why}); every process compiles anew. " + ADVICE)
         return None
     if problem:
         tell(f"the cache folder {where} {problem}; compiled code is neither read from it nor kept. " + ADVICE)
@@ -143,6 +146,10 @@ class Store:
         if time.time() - found.st_mtime > _DAY:
             with suppress(OSError):
                 os.utime(path)  # it is in use: not to be pruned
+        if data.startswith(ANY_FORMAT) and not data.startswith(MAGIC):  # whole, of another version
+            with suppress(OSError):
+                path.unlink()
+            return None
         start = len(MAGIC) + hashlib.sha256().digest_size
         if data[:start] != MAGIC + _seal(name, memoryview(data)[start:]):
             self.drop(name, "was damaged")

@@ -14,24 +14,25 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, redirect_stdout, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import click
 
-from crossbody.cases import CrossbodyError, installed
+from crossbody.cases import installed
 from crossbody.reports.commands import options
 from crossbody.reports.runs.watch import stopping
-from crossbody.reports.voice import as_json, folded, quiet, speaks
+from crossbody.reports.voice import as_json, folded, quiet, result, speaks
 
 
 def _plug(context: click.Context, _: click.Parameter, given: tuple[str, ...]) -> None:
     if not context.resilient_parsing:
         with suppress(FileNotFoundError):  # the folder one works in may be gone
-            installed.use(installed.configured(Path.cwd()))
-        installed.use(given)
+            given = (*map(str, installed.configured(Path.cwd())), *given)
+        with redirect_stdout(sys.stderr):  # what a file prints while it is imported is no result
+            installed.use(given)
 
 
 class _Commands(click.Group):
@@ -66,7 +67,8 @@ def list_(name: str | None, plain: bool) -> None:
     """
     from crossbody.reports import described
 
-    told = described.everything() if name is None else described.one(name)
+    with redirect_stdout(sys.stderr) if plain else nullcontext():
+        told = described.everything() if name is None else described.one(name)
     click.echo(json.dumps({k.lower(): v for k, v in told.items()}, indent=1) if plain else described.text(told))
 
 
@@ -235,7 +237,7 @@ def report(folder: Path, **asked: Any) -> int:
 
     made = site.write(folder, **asked).absolute()
     if as_json():
-        click.echo(json.dumps({"report": str(made)}))
+        result(json.dumps({"report": str(made)}))
     elif not quiet():
         click.echo(f"Report: {made}")
     return 0
@@ -375,10 +377,10 @@ def warm() -> int:
 
 @cli.group(invoke_without_command=True)
 @click.pass_context
-def cache(context: click.Context) -> None:
+@speaks
+def cache(context: click.Context) -> int:
     """Show the folder of compiled code and its size."""
-    if context.invoked_subcommand is None:
-        context.exit(context.invoke(cache_show))
+    return _do("cache.show") if context.invoked_subcommand is None else 0
 
 
 @cache.command("show")
@@ -415,11 +417,13 @@ def _obey(arguments: list[str] | None) -> int:
         return 130
     except click.ClickException as error:
         return _say(error.format_message())
-    except CrossbodyError as error:
-        return 130 if stopping() else _say(str(error))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if stopping():  # what is being imported may make an ImportError of it
             return 130
+        if told := installed.sentence(error):
+            return _say(told)
+        if isinstance(error, FileNotFoundError) and _nowhere():
+            return _say("The folder that the command was given in has been removed; change to another one.")
         if isinstance(error, OSError) and error.errno in REFUSED:
             _drop_what_cannot_be_printed()
             return _say(f"The system refuses: {error.strerror}{f' ({error.filename})' if error.filename else ''}.")
@@ -433,6 +437,14 @@ REFUSED = (
     errno.EBUSY, errno.ETXTBSY,
 )  # fmt: skip
 """What the system may refuse whatever a program does, paths that a user gave among it."""
+
+
+def _nowhere() -> bool:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _drop_what_cannot_be_printed() -> None:
@@ -449,7 +461,7 @@ def _say(text: str, code: int = 2) -> int:
     return code
 
 
-def _crashed(error: Exception) -> int:
+def _crashed(error: BaseException) -> int:
     """A fault of crossbody's own: one sentence, and the traceback in a file."""
     text = f"{options.command()}\n{sys.version}\n{''.join(traceback.format_exception(error))}"
     try:

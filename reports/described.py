@@ -67,9 +67,17 @@ def engine(name: str) -> Named:
 
 
 def one(name: str) -> Named:
-    """Return what can be asked of the case, file or engine of that name."""
-    from crossbody import engines
+    """Return what can be asked of the case, file or engine of that name.
 
+    Raises:
+        CrossbodyError: if there is none.
+    """
+    from crossbody import cases, engines
+    from crossbody.cases.loading import parted
+
+    known = (*cases.names(), *engines.names())
+    if "." not in name and parted(name)[0] not in known:
+        raise cases.UnknownName("case or engine", name, known)
     return engine(name) if name in engines.names() else case(name)
 
 

@@ -7,7 +7,7 @@ import math
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, redirect_stdout
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
 _KEY = "crossbody.voice"
-QUIET, JSON = "quiet", "json"
+QUIET, JSON, OUT = "quiet", "json", "out"
 
 
 def speaks(command: _Work) -> _Work:
@@ -26,8 +26,9 @@ def speaks(command: _Work) -> _Work:
 
     @wraps(command)
     def spoken(*args: Any, quiet: bool, as_json: bool, **more: Any) -> int:
-        click.get_current_context().meta[_KEY] = {QUIET: quiet, JSON: as_json}
-        return command(*args, **more)
+        click.get_current_context().meta[_KEY] = {QUIET: quiet, JSON: as_json, OUT: sys.stdout}
+        with redirect_stdout(sys.stderr) if as_json else nullcontext():  # what code of a user's own may print
+            return command(*args, **more)
 
     options = (
         click.option("--quiet", "-q", is_flag=True, help="Print errors and failures only, and no progress."),
@@ -40,9 +41,18 @@ def speaks(command: _Work) -> _Work:
     return speaking
 
 
-def _asked(word: str) -> bool:
+def _told() -> Mapping[str, Any]:
     context = click.get_current_context(silent=True)
-    return context is not None and bool(context.meta.get(_KEY, {}).get(word))
+    return {} if context is None else context.meta.get(_KEY, {})
+
+
+def _asked(word: str) -> bool:
+    return bool(_told().get(word))
+
+
+def result(text: str) -> None:
+    """Print the result of a command that prints nothing else."""
+    print(text, file=_told().get(OUT, sys.stdout), flush=True)
 
 
 def quiet() -> bool:
@@ -90,7 +100,7 @@ def finite(value: Any) -> Any:
 def told_as_json(tables: Mapping[str, pd.DataFrame]) -> bool:
     """Print tables as one JSON object if that was asked for; whether it was."""
     if as_json():
-        print(json.dumps({name: json.loads(rows_as_json(rows)) for name, rows in tables.items()}))
+        result(json.dumps({name: json.loads(rows_as_json(rows)) for name, rows in tables.items()}))
     return as_json()
 
 

@@ -88,6 +88,7 @@ def test_every_block_runs(
                 shutil.copy2(code, copy)
         monkeypatch.setenv("CROSSBODY_CACHE", str(copy.parent))
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)  # as Python does for a script that is run there
     scope: dict[str, Any] = {"__name__": "page", "__file__": str(tmp_path / "page.py")}
     for i, block in enumerate(blocks(page)):
         if block.title:

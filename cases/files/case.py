@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Coordinate, Inputs, Limit, Parameter, Value
 from crossbody.cases.control import Control
-from crossbody.cases.errors import SceneError, UnknownName
+from crossbody.cases.errors import SceneError
 from crossbody.cases.files.assemble import assembled
 from crossbody.cases.files.controls import pushed, read_control, read_controls, under
-from crossbody.cases.files.reading import findings_of, model_of, read, scene_of
+from crossbody.cases.files.reading import existing, findings_of, model_of, read, scene_of
 from crossbody.cases.files.text import check_text
 from crossbody.cases.rotations import normalised
 from crossbody.cases.scene import RowLaw, Scene
@@ -96,12 +96,9 @@ def open_file(name: str) -> FileCase:
     """Return what a file offers.
 
     Raises:
-        UnknownName: if it is not there.
+        NoFile: if it is not there.
     """
-    path = Path(name)
-    if not path.is_file():
-        raise UnknownName("robot file", name, ())
-    return FileCase(path=path)
+    return FileCase(path=existing(Path(name)))
 
 
 def rubbing(case: Case) -> Case | None:

@@ -16,7 +16,7 @@ from crossbody.cases.arguments import shown
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Inputs
 from crossbody.cases.control import Control
-from crossbody.cases.errors import InvalidValue, UnknownName
+from crossbody.cases.errors import InvalidValue, NoFile, UnknownName
 from crossbody.cases.installed import from_file
 from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import Push, Scene
@@ -35,11 +35,16 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
         InvalidValue: if it cannot be read, times do not increase, or an actuator has no column.
     """
     names = [actuator.name for actuator in scene.actuators]
+    if not path.is_file():
+        raise NoFile("table of controls", path)
     try:
         open_regular(path).close()
         times, values = _from_npz(path) if path.suffix == ".npz" else _from_table(path, names)
     except Exception as error:  # damaged, a table makes its library raise anything
-        raise InvalidValue(f"Controls {path}: {str(error) or type(error).__name__}") from None
+        told = (str(error) or type(error).__name__).removesuffix(".")
+        of_npz = f"arrays t (m,) and ctrl (m, {len(names)})"
+        valid = of_npz if path.suffix == ".npz" else f"a table with the columns {', '.join(('t', *names))}"
+        raise InvalidValue(f"Controls {path}: {told}; valid: {valid}.") from None
     if values.shape != (len(times), len(names)):
         raise InvalidValue(f"Controls {path} have the shape {values.shape}; valid: ({len(times)}, {len(names)}).")
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all() and len(times) and times[0] >= 0.0):
@@ -83,7 +88,7 @@ def _check_columns(columns: list[str], names: list[str]) -> None:
             raise ValueError(f"there is no column {name!r}; it has: {', '.join(columns)}.")
     for name in columns:
         if name not in ("t", *names):
-            raise ValueError(f"the column {name!r} is no actuator's; valid: {', '.join(('t', *names))}.")
+            raise ValueError(f"the column {name!r} is no actuator's.")
 
 
 def _check_size(size: int) -> None:

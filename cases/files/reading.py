@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from crossbody.cases.errors import InvalidValue, NoFile
 from crossbody.cases.files import mjcf, urdf
 from crossbody.cases.files.without import strip
 from crossbody.cases.regular import open_regular
@@ -13,9 +14,23 @@ from crossbody.cases.scene import Scene
 if TYPE_CHECKING:
     import mujoco
 
-SUFFIXES = (".xml", ".mjcf", ".urdf")
+SUFFIXES = (".xml", ".urdf")
 HEAD = 4096
 """Bytes in which the root of a file must begin, behind comments that are longer it is taken for MJCF."""
+
+
+def existing(path: Path) -> Path:
+    """Return the path of a robot file.
+
+    Raises:
+        NoFile: if it is not there.
+        InvalidValue: for another suffix, by which MuJoCo's compiler knows what it reads.
+    """
+    if not path.is_file():
+        raise NoFile("robot file", path)
+    if path.suffix not in SUFFIXES:
+        raise InvalidValue(f"The robot file {path} ends in {path.suffix!r}; valid: {', '.join(SUFFIXES)}.")
+    return path
 
 
 def is_urdf(path: Path) -> bool:

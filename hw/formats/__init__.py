@@ -17,11 +17,12 @@ from types import ModuleType
 from typing import Any
 
 from crossbody.cases import ColumnMapError, FormatUnavailable, LogFormatError
+from crossbody.cases.public_names import check_values
 from crossbody.cases.registry import Registry
 from crossbody.cases.regular import open_regular
 from crossbody.hw.budget import MEMORY, Budget, opening
 from crossbody.hw.formats._bounded import Bounded
-from crossbody.hw.formats._contract import BLOCK_ROWS, Block, Column, Group, Reader
+from crossbody.hw.formats._contract import BLOCK_ROWS, READER, Block, Column, Group, Reader
 
 __all__ = [
     "BLOCK_ROWS",
@@ -64,16 +65,21 @@ def load(name: str) -> ModuleType:
     try:
         return _REGISTRY.load(name)
     except ModuleNotFoundError as error:
-        raise unavailable(f"Log format {name!r}", error) from None
+        raise _lacking(name, error) from None
 
 
-def unavailable(who: str, error: ModuleNotFoundError) -> FormatUnavailable:
-    """The error for an absent package; a broken import of our own stays loud."""
+def _lacking(name: str, error: ModuleNotFoundError) -> FormatUnavailable:
+    return unavailable(f"Log format {name!r}", error, ours=name in _REGISTRY.own())
+
+
+def unavailable(who: str, error: ModuleNotFoundError, *, ours: bool = True) -> FormatUnavailable:
+    """The error for an absent package, of which ours are in one extra; a broken import of our own stays loud."""
     package = (error.name or "").partition(".")[0]
     if package in ("", "crossbody"):
         raise error
+    brings = "crossbody[logs]" if ours else package
     return FormatUnavailable(
-        f"{who} needs the package {package!r}, which is not installed: pip install 'crossbody[logs]' brings it."
+        f"{who} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."
     )
 
 
@@ -150,15 +156,18 @@ def open_log(path: Path, name: str | None = None, options: Any = None, memory: i
         FormatUnavailable: if the format's package is not installed.
         UnknownName: for a format that does not exist.
     """
-    module = load(name or recognise(path))
+    chosen = name or recognise(path)
+    module = load(chosen)
     if name is not None and not module.recognises(path, _head(path)):
         raise LogFormatError(path, f"does not begin as {name} files do: damaged, or in another format.")
     budget = Budget(path, memory)
     try:
         with opening(budget):
-            reader = Bounded(path, module.open_log(path, module.Options() if options is None else options), budget)
+            own = module.open_log(path, module.Options() if options is None else options)
+            check_values(f"What open_log of the log format {chosen!r} returns", own, READER)
+            reader = Bounded(path, own, budget)
     except ModuleNotFoundError as error:
-        raise unavailable(f"Log format {module.__name__.rpartition('.')[2]!r}", error) from None
+        raise _lacking(chosen, error) from None
     if not reader.groups:
         reader.close()
         why = next((f" ({column} {text})" for column, text in reader.refused.items()), "")

@@ -7,7 +7,8 @@ import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from crossbody.cases import LogFormatError
+from crossbody.cases import InvalidValue, LogFormatError
+from crossbody.cases.errors import shown
 from crossbody.hw.budget import MOST_COLUMNS, Budget
 from crossbody.hw.formats._contract import Block, Group, Reader
 
@@ -45,12 +46,28 @@ class Bounded:
                 block = next(blocks, None)
             if block is None:
                 return
+            _check(self.library, block, group, columns)
             self.budget.spend(WIDTH * sum(values.size for values in block.values()))
             yield block
 
     def close(self) -> None:
         """See `Reader`."""
         self._reader.close()
+
+
+def _check(library: str, block: Block, group: Group, columns: Sequence[str]) -> None:
+    """Refuse what is no block: arrays of one length for the columns that were asked for."""
+    good = isinstance(block, dict) and all(getattr(block.get(name), "ndim", 0) == 1 for name in columns)
+    if not good or len({len(values) for values in block.values()}) > 1:
+        told = (
+            {name: getattr(values, "shape", values) for name, values in block.items()}
+            if isinstance(block, dict)
+            else block
+        )
+        raise InvalidValue(
+            f"A block of the group {group.name!r} (read by {library}) is {shown(told)}; "
+            f"valid: a dictionary with an array (n,) for each of {', '.join(columns[:9])}."
+        )
 
 
 ROUNDS = 8  # times the file's size that its structure may cost to read: parsers do look at a block more than once

@@ -8,6 +8,9 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
+from crossbody.cases.arguments import whole
+from crossbody.cases.public_names import TEXT, Public, function, maps_to_texts
+
 Block = dict[str, NDArray[Any]]
 BLOCK_ROWS = 65536  # rows of one block: half a megabyte a column
 
@@ -47,6 +50,15 @@ class Group:
     step: float = 0.0
     start: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Check the number of rows, which memory is asked for.
+
+        Raises:
+            InvalidValue: if it is none.
+        """
+        if self.rows is not None:
+            whole("Group.rows", self.rows, low=0)
+
 
 class Reader(Protocol):
     """An open log.
@@ -74,3 +86,17 @@ class Reader(Protocol):
     def close(self) -> None:
         """Release the file; afterwards nothing can be read."""
         ...
+
+
+def _groups(value: Any) -> bool:
+    return isinstance(value, (tuple, list)) and all(isinstance(one, Group) for one in value)
+
+
+READER = {
+    "groups": Public("a tuple of Group", _groups),
+    "refused": Public("a mapping from columns to reasons", maps_to_texts),
+    "library": TEXT,
+    "blocks": function("group", "columns"),
+    "close": function(),
+}
+"""Names of a `Reader`, and what is valid for each."""

@@ -109,7 +109,7 @@ def _first(case: Case, pick: Pick, run: Any) -> tuple[Trajectory, str]:
         return run.run(), ""
     except CrossbodyError:  # wrong use of ours
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         crashed = crash(error)
         return of_start(case, crashed), crashed
 

@@ -56,7 +56,7 @@ def parse_place(pairs: Sequence[str]) -> dict[str, float]:
     Raises:
         InvalidValue: for what is not a number.
     """
-    found = choice.parse_settings(pairs)
+    found = choice.parse_settings(pairs, "--at")
     for name, value in found.items():
         if isinstance(value, str):
             raise InvalidValue(f"--at {name} is {value!r}; it must be a number.")

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from crossbody.cases import EngineUnavailable, InvalidValue, OutputError, UnknownName
+from crossbody.cases import EngineUnavailable, OutputError
 from crossbody.cases.arguments import shown
-from crossbody.cases.files.reading import is_urdf
+from crossbody.cases.files.reading import existing, is_urdf
 from crossbody.engines import importers
 from crossbody.reports import voice
 from crossbody.reports.importers import told
@@ -60,10 +60,7 @@ def audit(ask: Ask) -> int:
     Raises:
         CrossbodyError: for wrong use, a file that is none, engines none of which is there.
     """
-    if not ask.path.is_file():
-        if ask.path.exists():
-            raise InvalidValue(f"{shown(str(ask.path))} is a folder, a pipe or a device; it must be a robot file.")
-        raise UnknownName("robot file", str(ask.path), ())
+    existing(ask.path)
     _check_out(ask)
     found, rows = read_by_all(ask)
     if ask.explain or ask.sarif or ask.markdown:
@@ -74,7 +71,7 @@ def audit(ask: Ask) -> int:
     if voice.as_json():
         if ask.fix is not None:  # one document: that of the new file
             return _fix(ask, ask.fix)
-        print(json.dumps([asdict(row) for row in rows]))
+        voice.result(json.dumps([asdict(row) for row in rows]))
     else:
         _show(found, rows)
         if ask.explain:

@@ -12,6 +12,7 @@ from multiprocessing import get_context
 import click
 
 from crossbody import cases, engines
+from crossbody.cases import OutputError
 from crossbody.reference import ahead, code_store
 from crossbody.reports import voice
 
@@ -49,18 +50,28 @@ def show() -> int:
     entries = store.entries() if store else []
     size = sum(found.st_size for _, found in entries)
     if voice.as_json():
-        print(json.dumps({"folder": str(where), "usable": store is not None, "files": len(entries), "bytes": size}))
+        folder = None if where is None else str(where)
+        told = {"folder": folder, "usable": store is not None, "files": len(entries), "bytes": size}
+        voice.result(json.dumps(told))
     else:
-        print(f"{where}: {len(entries)} files, {size / 1e6:.1f} MB" + ("" if store else " (not used)"))
+        print(f"{where or 'No folder'}: {len(entries)} files, {size / 1e6:.1f} MB" + ("" if store else " (not used)"))
     return 0
 
 
 def clear() -> int:
-    """Remove all compiled code; other files of the folder stay."""
+    """Remove all compiled code; other files of the folder stay.
+
+    Raises:
+        OutputError: if some of it cannot be removed.
+    """
     store = code_store.current()
+    entries = store.entries() if store else []
     removed = store.clear() if store else 0
+    if left := sum(path.exists() for path, _ in entries):
+        files = f"{left} file{'s' if left > 1 else ''} of {code_store.base()}"
+        raise OutputError(f"{files} cannot be removed ({removed} were): the folder must be writable.")
     if voice.as_json():
-        print(json.dumps({"removed": removed}))
+        voice.result(json.dumps({"removed": removed}))
     elif not voice.quiet():
         print(f"Removed {removed} files of compiled code; the next run compiles again.")
     return 0

@@ -225,11 +225,10 @@ def _metrics(found: Comparison, rows: pd.DataFrame) -> pd.DataFrame:
 def _say_outside(rows: pd.DataFrame) -> None:
     """One line a number that is outside its limit."""
     for row in rows[rows["verdict"] == Word.OUTSIDE].to_dict(orient="records"):
-        best = f" of {row['expected']:g}" if row["expected"] else ""
-        print(
-            f"outside: {row['engine']}:{row['profile']} {row['metric']} is {row['value']:.4g} "
-            f"{row['unit']}, limit {row['limit']:.4g}{best}. {row['why']}"
-        )
+        best, most = row["expected"], row["limit"]
+        bound = f"valid: at least {best - most:.6g}" if best else f"limit {most:.4g}"
+        who, value = f"{row['engine']}:{row['profile']}", f"{row['value']:.4g} {row['unit']}"
+        print(f"outside: {who} {row['metric']} is {value}, {bound}. {row['why']}")
 
 
 def _say(found: Comparison, metrics: pd.DataFrame) -> None:

@@ -90,7 +90,7 @@ def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | None:
     """Print the verdicts of a folder; what keeps them from being printed."""
     try:
         if voice.as_json():
-            print(voice.plain_rows_as_json(rows), flush=True)
+            voice.result(voice.plain_rows_as_json(rows))
             return None
         if controlled and not voice.quiet():
             show_controllers(made)

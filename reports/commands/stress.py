@@ -65,7 +65,7 @@ def stress(ask: Ask, out: Path, command: str) -> int:
     tables["stress_summary"] = summary(rows, times)
     publish(store.path, STRESS, tables, provenance(command, seed=ask.seed))
     if voice.as_json():
-        print(voice.rows_as_json(small))
+        voice.result(voice.rows_as_json(small))
     else:
         _show(rows, small, out)
     return exit_code(rows["verdict"])

@@ -6,10 +6,11 @@ import math
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from crossbody import engines
-from crossbody.cases import Case, Claim, InvalidValue, Limit, Trajectory, UnknownName
+from crossbody.cases import Case, Claim, CrossbodyError, InvalidValue, Limit, Trajectory, UnknownName
 from crossbody.cases.arguments import instance, shown
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import limits_of
@@ -370,8 +371,10 @@ def _is_known(judge_: _Judge, limit: Limit, row: AuditRow) -> bool:
     return stored == row.difference or (sizes is not None and sizes[0] <= row.difference <= sizes[1])
 
 
-def crash(error: Exception) -> str:
-    """What was thrown, and where."""
+def crash(error: BaseException) -> str:
+    """What was thrown, and where, unless it says itself what would be valid."""
+    if isinstance(error, CrossbodyError):
+        return f"{type(error).__name__}: {error}"
     place = "".join(traceback.format_tb(error.__traceback__)[-1:]).strip().splitlines()[0]
     return f"{type(error).__name__}: {error} ({place})"
 
@@ -384,7 +387,7 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict
             continue
         try:
             found = _row(judge_, metric, name, wanted, truth, run)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             found = judge_.row(name, math.nan, metric.UNIT, Word.CRASHED, crash(error))
         if found is not None:
             yield found
@@ -418,6 +421,8 @@ def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, cas
         return truth.at(times)
 
     value = metric.measure(replace(truth, at=at), run, case)
+    if value is not None:
+        value = float(instance(f"What measure of {name!r} returns", value, Real, "a number, NaN or None"))
     return value, min(min(until) / case.t_end, 1.0)
 
 
@@ -428,7 +433,7 @@ def _split(judge_: _Judge) -> Iterator[Verdict]:
         return
     try:
         found = splits(judge_.case, judge_.truth, entry.run, entry.study or Study(), entry.own)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         yield judge_.row(part_of("position", "step"), math.nan, "1", Word.CRASHED, crash(error))
         return
     for name, parts in found.items():

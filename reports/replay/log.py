@@ -43,7 +43,7 @@ def info(path: Path, columns: str | None, part: int | None, draft_only: bool, me
         _show(found)
     told = found.findings if columns is None else hw.check(path, columns, part, memory=room)
     if voice.as_json():
-        print(json.dumps(plain(found, told), indent=1, allow_nan=False))
+        voice.result(json.dumps(plain(found, told), indent=1, allow_nan=False))
     else:
         _show_findings([one for one in told if one.fault or not voice.quiet()])
     if columns is None:

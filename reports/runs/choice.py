@@ -11,7 +11,7 @@ from crossbody.cases import Case, EngineUnavailable, InvalidValue, UnknownName, 
 
 DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
-_EXAMPLES = {"--set": "a1=0", "--set-engine": "dt=1e-4"}
+_EXAMPLES = {"--set": "a1=0", "--set-engine": "dt=1e-4", "--at": "z=0.4"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

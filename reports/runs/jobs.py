@@ -6,12 +6,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter, process_time
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from crossbody import engines
-from crossbody.cases import Case, CaseUnsupported, CrossbodyError, InvalidValue, Outcome, Trajectory, Value
+from crossbody.cases import Case, CaseUnsupported, CrossbodyError, InvalidValue, Outcome, SceneError, Trajectory, Value
+from crossbody.cases.arguments import instance
+from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.covered import covered
@@ -39,6 +41,8 @@ FIRST, DEAR = 0.02, 12.0
 """Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it
 is not begun unless its profile is asked for: engines that follow the law take their steps in Python."""
 COMPILED = ("reference", "compiled")  # who follows what the truth has followed
+_OF_RUNS = {"profile": TEXT, "settings": Public("a mapping from names to values", lambda one: isinstance(one, Mapping))}
+_Kind = TypeVar("_Kind")
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model of the scene."""
 
@@ -152,7 +156,7 @@ def _entry(
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         return Entry(engine=pick.engine, profile=pick.profile, crashed=crash(error))
 
 
@@ -164,11 +168,11 @@ def _ran(
         raise CaseUnsupported(dear)
     bounded = pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
     prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
-    shown = prepared.audit()
+    shown = _of_engine(pick, "audit", prepared.audit(), Mapping, "a mapping")  # type: ignore[type-abstract]
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     began = process_time()
-    natural: Trajectory = prepared.run()
+    natural = _of_case(case, pick, prepared.run())
     if bounded and natural.outcome is Outcome.TIME_LIMIT:
         raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
@@ -205,9 +209,35 @@ def _too_dear(pick: Pick, cost: str) -> str:
 def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:
     """A prepared run, with those of the asked settings that the engine has."""
     engine = engines.load(pick.engine)
-    prepared = engine.prepare(case, pick.profile)
+    prepared = _checked(pick, engine.prepare(case, pick.profile))
     own = {key: value for key, value in asked.items() if key in prepared.settings}
-    return engine.prepare(case, pick.profile, **own) if own else prepared
+    return _checked(pick, engine.prepare(case, pick.profile, **own)) if own else prepared
+
+
+def _of_engine(pick: Pick, method: str, value: object, kind: type[_Kind], wanted: str) -> _Kind:
+    """Return what a method of an engine, which may be anybody's, has returned.
+
+    Raises:
+        InvalidValue: if it is of another type.
+    """
+    return instance(f"What {method} of the engine {pick.engine!r} returns", value, kind, wanted)
+
+
+def _checked(pick: Pick, made: object) -> engines.Run:
+    run = _of_engine(pick, "prepare", made, engines.Run, "a crossbody.engines.Run")  # type: ignore[type-abstract]
+    check_values(f"What prepare of the engine {pick.engine!r} returns", run, _OF_RUNS)
+    return run
+
+
+def _of_case(case: Case, pick: Pick, made: object) -> Trajectory:
+    run = _of_engine(pick, "run", made, Trajectory, "a crossbody.cases.Trajectory")
+    for name, own in (("q", case.q0), ("v", case.v0), ("gap", case.contacts)):
+        if (found := getattr(run, name).shape[1]) != len(own):
+            raise SceneError(
+                f"What run of the engine {pick.engine!r} returns has {found} columns of {name}; "
+                f"valid: {len(own)}, as {case.label} has."
+            )
+    return run
 
 
 def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Mapping[str, Value]) -> Trajectory:

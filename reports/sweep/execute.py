@@ -93,7 +93,10 @@ def _try(spec: Spec) -> Tried:
         tried.outcome, tried.message = SKIPPED, str(error)
     except CrossbodyError as error:
         tried.outcome, tried.message = REFUSED, str(error)
-    except Exception as error:  # the point of a stress run: whatever an engine throws is a row, not the end
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # the point of a stress run: whatever an engine throws is a row, not the end
         tried.outcome, tried.message = EXCEPTION, f"{type(error).__name__}: {error}"
         tried.broken = "".join(traceback.format_tb(error.__traceback__)[-2:]).strip()
     return tried
@@ -130,7 +133,7 @@ def _error(spec: Spec, tried: Tried) -> Error:
     asked = Asked(limit=limit(spec, tried.settings), near=lambda: _beside(spec, case, tried.settings), second=second)
     try:
         return error(case, run, asked)
-    except Exception as fault:  # a truth that cannot be worked out is a finding as well
+    except (Exception, SystemExit) as fault:  # a truth that cannot be worked out is a finding as well
         tried.broken = "".join(traceback.format_tb(fault.__traceback__)[-2:]).strip()
         tried.message = f"measuring: {type(fault).__name__}: {fault}"
         return Error()

@@ -39,7 +39,7 @@ def together(specs: Iterable[Spec]) -> list[dict[str, Any]]:
         except CrossbodyError as error:
             rows.append(row(spec, Tried(outcome=REFUSED, message=str(error)), Error(), []))
             continue
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             said = f"{type(error).__name__}: {error}"
             rows.append(row(spec, Tried(outcome=EXCEPTION, message=said, broken=said), Error(), []))
             continue

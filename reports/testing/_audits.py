@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from crossbody.cases import CrossbodyError
+from crossbody.cases.files.reading import existing
 from crossbody.engines import importers
 from crossbody.reports.importers.audit import audited
 from crossbody.reports.importers.compare import NONE, OK, QUANTITIES, UNSUPPORTED, Row
@@ -50,8 +51,10 @@ class Audits(pytest.Collector):
             raise self.CollectError(str(error)) from None
         for text in typed or self.config.getini("crossbody_audits"):
             path = base / Path(text).expanduser()
-            if not path.is_file():
-                raise self.CollectError(f"There is no robot file {path}.")
+            try:
+                existing(path)
+            except CrossbodyError as error:
+                raise self.CollectError(str(error)) from None
             file = Audited(path, engines)
             for engine in engines:
                 for quantity in QUANTITIES:

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from crossbody.cases import Case, CrossbodyError
+from crossbody.cases import Case, installed
 from crossbody.cases.defaults import limits_of
+from crossbody.cases.loading import OF_USERS
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.testing import plugin
@@ -36,8 +37,10 @@ class Judged(pytest.Item):
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any, **more: Any) -> Any:
         """A verdict, or wrong use, is told in its own sentence; anything else with its traceback."""
-        if isinstance(excinfo.value, (Outside, CrossbodyError)):
+        if isinstance(excinfo.value, Outside):
             return str(excinfo.value)
+        if told := installed.sentence(excinfo.value):
+            return told
         return super().repr_failure(excinfo, *args, **more)
 
     def reportinfo(self) -> tuple[str, None, str]:
@@ -70,8 +73,10 @@ class OneCase(pytest.Collector):
         bench = plugin.bench(self.config)
         try:
             case = bench.case(self.scene)
-        except CrossbodyError as error:
-            raise self.CollectError(str(error)) from None
+        except (Exception, SystemExit) as error:
+            if told := installed.sentence(error):
+                raise self.CollectError(told) from None
+            raise
         for named in picks(self.config):
             for metric in judged(case, named.pick):
                 yield OneLimit.from_parent(
@@ -94,7 +99,7 @@ class OneLimit(Judged):
     def __init__(self, *, scene: Scene, named: Named, metric: str, **more: Any) -> None:
         super().__init__(**more)
         self.scene, self.pick, self.metric = scene, named.pick, metric
-        self.where = scene.name if scene.name.endswith(".py") else plugin.MARKER
+        self.where = scene.name if scene.name.endswith(OF_USERS) else plugin.MARKER
 
     def runtest(self) -> None:
         """Judge; within passes, a known deviation is an xfail, what there is not is a skip."""

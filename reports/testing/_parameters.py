@@ -11,7 +11,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import CrossbodyError
-from crossbody.cases.loading import parted
+from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports.runs import choice
 from crossbody.reports.runs.choice import Pick
 
@@ -83,7 +83,7 @@ def _base(config: pytest.Config, mark: pytest.Mark | None) -> Path:
 
 
 def _variants(name: str, variant: str | None, base: Path) -> list[Scene]:
-    source = str(base / Path(name).expanduser()) if name.endswith(".py") else name
+    source = str(base / Path(name).expanduser()) if name.endswith(OF_USERS) else name
     known = cases.variants(source)
     if variant is not None and variant not in known:
         raise cases.UnknownName(f"variant of {Path(name).stem}", variant, known)

@@ -126,3 +126,12 @@ def test_a_filter_alone_has_a_time_constant(activation: str, time_constant: floa
     else:
         with pytest.raises(SceneError, match="a filter alone has one, above 0 s"):
             Actuator(**given)
+
+
+@pytest.mark.parametrize("field", ["q0", "v0"])
+@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+def test_a_start_that_is_not_finite_is_the_case_s(field: str, wrong: float) -> None:
+    hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0))
+    scene = Scene(bodies=(Body(name="rod", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),), joints=(hinge,))
+    with pytest.raises(SceneError, match=rf"^Case scene: {field} is \[{wrong}\]; it must be finite\.$"):
+        cases.from_scene(scene, **{field: [wrong]})

@@ -186,6 +186,16 @@ def test_replay_has_limits_and_an_exit_code(
     assert told == [row["metric"] for row in rows if row["verdict"] == "outside"]
 
 
+def test_a_lower_bound_is_told_as_it_was_given(
+    two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ("replay", two_frictions, *ONE, "-e", "reference", "--limit", "fit=99.9995", "--limit", "rmse=1e-9")
+    assert code(*asked, "--out", tmp_path) == 1
+    told = capsys.readouterr().out
+    assert re.search(r"outside: reference:compiled fit_th1 is [\d.]+ %, valid: at least 99\.9995\. ", told), told
+    assert re.search(r"outside: reference:compiled rmse_th1 is [\d.e-]+ rad, limit 1e-09\. ", told)
+
+
 def test_what_was_identified_is_replayed_as_replay_does(
     two_frictions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

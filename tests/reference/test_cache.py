@@ -25,7 +25,7 @@ from numba.core import types
 from crossbody.reference import cache, code_store, kernels
 from crossbody.reference.cache import Compiled, compiled
 from crossbody.reference.code_store import CODE, LOCK, Store
-from crossbody.reports.cli import cli
+from crossbody.reports.cli import cli, main
 
 ROOT = os.name == "posix" and os.geteuid() == 0
 PROGRAM = """
@@ -284,12 +284,22 @@ def test_damaged_files_are_dropped_told_and_compiled_again(folder, capsys):
         elif trial < 3:
             data = data[: draw.randrange(len(data))]
         else:
-            data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+            data[draw.randrange(len(code_store.MAGIC), len(data))] ^= 1 << draw.randrange(8)
         path.write_bytes(data)
         code_store._told.clear()
         assert _value(_kernel(5.0)) == 5.0
         assert f"{path} was damaged; it is compiled again." in capsys.readouterr().err
         assert path.read_bytes() != bytes(data)
+
+
+def test_a_file_of_another_format_is_written_over_without_a_word(folder, capsys):
+    assert _value(_kernel(2.5)) == 2.5
+    (path,) = folder.iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(code_store.MAGIC, code_store.ANY_FORMAT + b"0\n", 1))
+    assert _value(_kernel(2.5)) == 2.5
+    assert path.read_bytes().startswith(code_store.MAGIC)
+    assert capsys.readouterr().err == ""
 
 
 def test_a_compilation_that_takes_long_is_told_once(monkeypatch, capsys):
@@ -464,13 +474,40 @@ def test_the_command_shows_and_clears(folder):
     _value(_kernel(30.0))
     run = CliRunner()
     (path,) = folder.iterdir()
-    shown = run.invoke(cli, ["cache", "show", "--json"])
-    assert json.loads(shown.output) == {
-        "folder": str(folder), "usable": True, "files": 1, "bytes": path.stat().st_size
-    }  # fmt: skip
+    for words in (["cache", "--json"], ["cache", "show", "--json"]):
+        assert json.loads(run.invoke(cli, words).output) == {
+            "folder": str(folder), "usable": True, "files": 1, "bytes": path.stat().st_size
+        }  # fmt: skip
     assert f"{folder}: 1 files" in run.invoke(cli, ["cache"]).output
     assert json.loads(run.invoke(cli, ["cache", "clear", "--json"]).output) == {"removed": 1}
     assert not list(folder.iterdir())
+
+
+def test_the_command_says_what_it_cannot_clear(folder, monkeypatch, capsys):
+    """As in a folder that another user has filled: nothing is said to be removed that is still there."""
+    _value(_kernel(30.0))
+    monkeypatch.setattr(Path, "unlink", lambda path: os.unlink(folder / "absent"))
+    with pytest.raises(SystemExit) as end:
+        main(["cache", "clear"])
+    told = capsys.readouterr()
+    assert (end.value.code, told.out) == (2, "")
+    assert told.err == f"crossbody: 1 file of {folder} cannot be removed (0 were): the folder must be writable.\n"
+
+
+def test_where_nothing_can_be_kept_the_command_says_so(tmp_path, monkeypatch, capsys):
+    """A file in the way of the folder, and a home that nobody has."""
+    (tmp_path / "file").touch()
+    for place, shown, why in (
+        (str(tmp_path / "file"), f"{tmp_path / 'file' / 'compiled'}", f"{tmp_path / 'file'} is a file"),
+        ("~no such user/cache", None, "there is no such home folder"),
+    ):
+        monkeypatch.setenv("CROSSBODY_CACHE", place)
+        with pytest.raises(SystemExit) as end:
+            main(["cache", "show", "--json"])
+        told = capsys.readouterr()
+        assert json.loads(told.out) == {"folder": shown, "usable": False, "files": 0, "bytes": 0}
+        assert end.value.code == 0
+        assert f"({why}); every process compiles anew. Set CROSSBODY_CACHE to another folder." in told.err
 
 
 def test_a_folder_in_place_of_a_file_is_told_and_written_over(folder, capsys):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from places import OWN
+from robot_readers import ARM
 
 pytest_plugins = ["pytester"]
 
@@ -250,5 +251,24 @@ def test_plug_ins_are_files_too(pytester: pytest.Pytester, by: str) -> None:
 
 def test_a_plug_in_that_is_not_there_is_wrong_use(pytester: pytest.Pytester) -> None:
     done = run(pytester, "--crossbody-plugin", "absent.py")
-    done.stderr.fnmatch_lines(["ERROR: There is no plug-in file *absent.py."])
+    done.stderr.fnmatch_lines(["ERROR: There is no plug-in file '*absent.py'; there is no other [*].py in its folder."])
     assert done.ret == pytest.ExitCode.USAGE_ERROR
+
+
+def test_what_is_wrong_in_a_file_is_a_sentence(pytester: pytest.Pytester) -> None:
+    raising = OWN.read_text().replace("    known =", "    raise LookupError('own')\n    known =", 1)
+    pytester.makepyfile(mine=raising, wrong=f"{METRIC}\nUNIT = 3\n")
+    done = run(pytester, "--crossbody-case", "mine.py:right")
+    done.stdout.fnmatch_lines(["*The case file *mine.py raises LookupError (own) in line *"])
+    assert "Traceback" not in done.stdout.str()
+    done = run(pytester, "--crossbody-plugin", "wrong.py")
+    done.stderr.fnmatch_lines(["ERROR: The metric file *wrong.py: UNIT is 3; valid: a text*"])
+    assert done.ret == pytest.ExitCode.USAGE_ERROR
+
+
+def test_a_robot_file_of_the_configuration_is_found_from_a_folder_below(pytester: pytest.Pytester) -> None:
+    pytester.makefile(".xml", arm=ARM)
+    pytester.makeini("[pytest]\ncrossbody_cases = arm.xml\ncrossbody_engines = reference:compiled\n")
+    os.chdir(pytester.mkdir("below"))
+    done = run(pytester, "--rootdir", str(pytester.path), "-c", str(pytester.path / "tox.ini"), "--co", "-q")
+    done.stdout.fnmatch_lines(["*arm:reference::reference:compiled::position*"])

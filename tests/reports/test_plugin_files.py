@@ -9,6 +9,7 @@ from places import OWN
 
 from crossbody import engines
 from crossbody.cases import InvalidValue, installed
+from crossbody.cases.errors import NoFile
 from crossbody.reports import metrics
 from crossbody.reports.cli import cli, main
 from crossbody.reports.sweep import pools
@@ -147,7 +148,7 @@ def test_what_a_file_holds_tells_a_sweep_from_another(here: Path) -> None:
 
 
 def test_python_is_told_as_the_command_is(here: Path) -> None:
-    with pytest.raises(InvalidValue, match="There is no plug-in file"):
+    with pytest.raises(NoFile, match="There is no plug-in file"):
         installed.use(["absent.py"])
     with pytest.raises(InvalidValue, match="plug-in is 3"):
         installed.use([3])  # type: ignore[list-item]
