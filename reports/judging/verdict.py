@@ -136,7 +136,8 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     """The word and the reason for one number.
 
     A claim without a limit must come out exactly. What is not finite is outside, even where
-    nothing is judged.
+    nothing is judged; so is a known deviation that is no more there: whatever took it away may
+    be in what measures it.
 
     Args:
         value: the number.
@@ -152,11 +153,13 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     said = "" if claim is None else f"{claim.expected:g} claimed: {claim.source}. "
     why = "" if limit is None else limit.why
     off = deviation(value, claim)
-    if off <= allowed:
+    known = limit is not None and limit.known != ""
+    sizes = explained(limit, stored) if limit is not None and known else None
+    if off <= allowed and (sizes is None or sizes[0] <= allowed):
         return Word.WITHIN, (said + why).strip()
-    if limit is None or not limit.known:
+    if limit is None or not known:
         return Word.OUTSIDE, (said + why).strip()
-    if (sizes := explained(limit, stored)) is None:
+    if sizes is None:
         return Word.INFO, f"Known, but its size has not been measured here: {limit.known}"
     least, most = sizes
     if least <= off <= most:
