@@ -59,7 +59,8 @@ SUM = 1e-9
 LARGEST = "largest"
 """Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 FLOOR = 0.5
-"""A number is judged where at least this part of the time for which the truth must be trusted was compared."""
+"""A number is judged where at least this part of the time for which the truth must be trusted was
+compared; that of a stored run with the same deviation, which was compared as far, is judged by it."""
 REACHED = 1e-9
 """Part of the horizon by which the end of a record may miss it: steps that do not add up to it exactly."""
 
@@ -255,7 +256,7 @@ class _Judge:
         word, why = judge(value, limit, claim, stored)
         known = self.case.chaos or self.truth.horizon
         until = 1.0 if known is None else min(1.0, known.until / self.case.t_end)
-        if compared < FLOOR * until and word in (Word.WITHIN, Word.EXPECTED):
+        if compared < FLOOR * until and (word is Word.WITHIN or (word is Word.EXPECTED and stored is None)):
             word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon alone: {against.source}"
         most = band(stored, limit, claim)
         kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST

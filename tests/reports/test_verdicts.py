@@ -122,6 +122,23 @@ def test_a_number_of_the_stored_run_that_nobody_asks_for_any_more_is_outside(cas
     assert (row.metric, row.verdict) == ("contacts", Word.OUTSIDE)
 
 
+@pytest.mark.parametrize("stored", [None, 0.02])
+@pytest.mark.parametrize(("value", "word"), [(1e-4, Word.WITHIN), (0.03, Word.EXPECTED), (0.05, Word.OUTSIDE)])
+@pytest.mark.parametrize("compared", [0.4, 0.6])
+def test_a_small_part_says_as_much_of_a_deviation_as_that_of_the_stored_run(
+    compared: float, value: float, word: Word, stored: float | None, case: Case, motion: Trajectory
+) -> None:
+    """A run by another law may share few events with the truth: what is within is not judged by them alone."""
+    judge_ = comparison._Judge(case, Entry(engine="fake", profile="good", run=motion), truth_of(case), "run")
+    judge_.limits = (replace(LIMIT, metric="x", known="it is known to do that", known_size=0.04),)
+    judge_.stored = {} if stored is None else {"x": stored}
+    if stored is not None and value == 1e-4:
+        word = Word.OUTSIDE  # no more as far off as stored
+    elif stored is None and compared < 0.5 and word != Word.OUTSIDE:
+        word = Word.INFO
+    assert judge_.judged("x", value, "1", judge_.truth, compared).verdict == word
+
+
 @given(
     parts=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), off=st.sampled_from([0.0, 1e-6, -1e-6, math.nan]),
     trusted=st.sampled_from([None, 0.5, 1.0]), missing=st.booleans(),
