@@ -33,6 +33,7 @@ from crossbody.reports.judging.verdict import (
     Regression,
     Verdict,
     Word,
+    as_stored,
     band,
     deviation,
     explained,
@@ -254,6 +255,9 @@ class _Judge:
         """One number: its word by physics and method, and by the stored run."""
         claim, limit, stored = self.claims.get(metric), self.limit(metric), self.stored.get(metric)
         word, why = judge(value, limit, claim, stored)
+        if word is Word.INFO and limit is None:
+            shown = limit_for(self.limits, "*", self.entry.engine, self.entry.profile)
+            word, why = as_stored(value, shown, stored)
         known = self.case.chaos or self.truth.horizon
         until = 1.0 if known is None else min(1.0, known.until / self.case.t_end)
         if compared < FLOOR * until and (word is Word.WITHIN or (word is Word.EXPECTED and stored is None)):

@@ -14,6 +14,8 @@ FACTOR = 2.0
 """A known property takes an engine between a FACTOR-th of what a stored run gave and FACTOR times it."""
 BAND = 10.0
 """A number that was right may become so many times what a stored run gave before it counts as lost."""
+NOUGHT = 1e-6
+"""A number that nothing limits is as good as none below, in its unit: it may be but a thousand default tolerances."""
 ROUNDING = 1e-12
 """Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
@@ -165,6 +167,19 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     if least <= off <= most:
         return Word.EXPECTED, limit.known
     return Word.OUTSIDE, f"{said}A known property explains {least:.3g} to {most:.3g}: {limit.known}"
+
+
+def as_stored(value: float, shown: Limit | None, stored: float | None) -> tuple[Word, str]:
+    """The word for a number that nothing limits: that of its size, where a property is shown in any metric.
+
+    Args:
+        value: the number, finite.
+        shown: limit with the property; None where an engine has none that is.
+        stored: the number of a stored run with the same parameters and settings; None where there is none.
+    """
+    if shown is None or stored is None or not stored > FACTOR * NOUGHT:
+        return Word.INFO, ""
+    return judge(value, replace(shown, value=NOUGHT, known_least=0.0), None, stored)
 
 
 def band(stored: float | None, limit: Limit | None, claim: Claim | None = None) -> float:

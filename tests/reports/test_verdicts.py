@@ -20,13 +20,13 @@ from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports import metrics
 from crossbody.reports.commands import bands
-from crossbody.reports.judging import comparison, stored
+from crossbody.reports.judging import comparison, stored, verdict
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
 from crossbody.reports.judging.parts import Split
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
-from crossbody.reports.judging.verdict import FACTOR, Regression, Word, band, exit_code, judge, limit_for
+from crossbody.reports.judging.verdict import FACTOR, Regression, Word, as_stored, band, exit_code, judge, limit_for
 from crossbody.reports.measuring.truth import TRUTH, from_run
 from crossbody.reports.runs import jobs
 from crossbody.reports.runs.choice import picks
@@ -230,6 +230,22 @@ def test_the_word_of_a_number_is_that_of_the_first_that_speaks(
     else:
         wanted = Word.EXPECTED if sizes[0] <= value <= sizes[1] else Word.OUTSIDE
     assert judge(said, limit if limited else None, claim, stored)[0] == wanted
+
+
+@given(
+    value=st.floats(-1.0, 1.0), stored=st.one_of(st.none(), st.just(math.nan), st.floats(0.0, 1.0)),
+    shown=st.booleans(),
+)  # fmt: skip
+def test_a_number_without_a_limit_is_held_to_that_of_the_stored_run_where_a_property_shows_everywhere(
+    value: float, stored: float | None, shown: bool
+) -> None:
+    """By half to twice of it, where half of it is more than nothing."""
+    everywhere = Limit(metric="*", known="it is known to do that")
+    if not shown or stored is None or not stored / FACTOR > verdict.NOUGHT:
+        wanted = Word.INFO
+    else:
+        wanted = Word.EXPECTED if stored / FACTOR <= abs(value) <= stored * FACTOR else Word.OUTSIDE
+    assert as_stored(value, everywhere if shown else None, stored)[0] == wanted
 
 
 def test_the_reason_of_a_known_deviation_is_told() -> None:
@@ -630,6 +646,8 @@ def test_a_known_deviation_is_stored_as_the_run_has_it_and_anything_else_at_its_
     known = bands._known(load("newtons_cradle", "sliders"), Entry(engine="pinocchio", profile="law"))
     assert "touch_count" in known
     assert "start_error" not in known
+    known = bands._known(load("newtons_cradle", "sliders"), Entry(engine="mujoco", profile="default"))
+    assert "penetration" in known, "which nothing limits"
     found = bands._largest({"a": 1.0, "b": 1.0, "c": 1.0}, {"a": 3.0, "b": 3.0}, frozenset({"a"}))
     assert found == {"a": 1.0, "b": 3.0, "c": 1.0}
 
