@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from crossbody import cases, engines
 from crossbody.cases import Case
 from crossbody.cases.defaults import limits_of
+from crossbody.reports import metrics
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import Entry, measured
 from crossbody.reports.judging.verdict import limit_for
@@ -45,8 +46,9 @@ def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviati
 def _known(case: Case, entry: Entry) -> frozenset[str]:
     """Metrics that a known property explains, by half to twice what is stored: the run's own stands."""
     limits = limits_of(case)
-    named = {limit.metric for limit in limits}
-    found = {name: limit_for(limits, name, entry.engine, entry.profile) for name in named}
+    shown = limit_for(limits, "*", entry.engine, entry.profile)
+    named = {limit.metric for limit in limits} | set(metrics.of(case))
+    found = {name: limit_for(limits, name, entry.engine, entry.profile) or shown for name in named}
     return frozenset(name for name, limit in found.items() if limit is not None and limit.known)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -30,9 +30,11 @@ from crossbody.reports.judging.stored import (
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import (
     COLUMNS,
+    ROUNDING,
     Regression,
     Verdict,
     Word,
+    as_stored,
     band,
     deviation,
     explained,
@@ -54,10 +56,13 @@ GROWING = frozenset({
 grows as the motion has it."""
 WIDEST = 1e-3
 """To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion."""
+SUM = 1e-9
+"""To which part of it the parts of an error add up to it."""
 LARGEST = "largest"
 """Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 FLOOR = 0.5
-"""A number is judged where at least this part of the time for which the truth must be trusted was compared."""
+"""A number is judged where at least this part of the time for which the truth must be trusted was
+compared; that of a stored run with the same deviation, which was compared as far, is judged by it."""
 REACHED = 1e-9
 """Part of the horizon by which the end of a record may miss it: steps that do not add up to it exactly."""
 
@@ -251,9 +256,12 @@ class _Judge:
         """One number: its word by physics and method, and by the stored run."""
         claim, limit, stored = self.claims.get(metric), self.limit(metric), self.stored.get(metric)
         word, why = judge(value, limit, claim, stored)
+        if word is Word.INFO and limit is None:
+            shown = limit_for(self.limits, "*", self.entry.engine, self.entry.profile)
+            word, why = as_stored(value, shown, stored)
         known = self.case.chaos or self.truth.horizon
         until = 1.0 if known is None else min(1.0, known.until / self.case.t_end)
-        if compared < FLOOR * until and word in (Word.WITHIN, Word.EXPECTED):
+        if compared < FLOOR * until and (word is Word.WITHIN or (word is Word.EXPECTED and stored is None)):
             word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon alone: {against.source}"
         most = band(stored, limit, claim)
         kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST
@@ -273,7 +281,7 @@ class _Judge:
             return self.row(metric, math.nan, unit, Word.INFO, self.entry.hidden[needs], expected=expected)
         known = "" if limit is None else limit.known
         word = Word.EXPECTED if known and stored is not None and math.isnan(stored) else Word.OUTSIDE
-        if limit is not None and limit.covers_none and claim is None:
+        if limit is not None and limit.covers_none and claim is None and stored is None:
             return self.row(metric, math.nan, unit, Word.INFO, f"{why} Known: {limit.known}.")
         if claim is not None:
             why += f" {claim.expected:g} claimed: {claim.source}."
@@ -299,7 +307,9 @@ def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdi
     if not len(entry.run.t):
         return rows
     run = before(entry.run, truth.trusted) if truth.trusted < entry.run.t[-1] else entry.run
-    return [*rows, *_measured(judge_, run, truth), *_split(judge_)]
+    rows += _measured(judge_, run, truth)
+    rows += _split(judge_, {row.metric: row.value for row in rows})
+    return [*rows, *_vanished(judge_, {row.metric for row in rows})]
 
 
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
@@ -393,6 +403,13 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict
             yield found
 
 
+def _vanished(judge_: _Judge, shown: Set[str]) -> Iterator[Verdict]:
+    """A number that the stored run of the same parameters and settings has, and this one is not asked for."""
+    for name, value in judge_.stored.items():
+        if math.isfinite(value) and not name.startswith((LARGEST, "audit ")) and name not in shown:
+            yield judge_.row(name, math.nan, "", Word.OUTSIDE, "The stored run of the same parameters has this number.")
+
+
 def _row(
     judge_: _Judge, metric: metrics.Metric, name: str, wanted: bool, truth: Truth, run: Trajectory
 ) -> Verdict | None:
@@ -426,8 +443,13 @@ def _value(metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, cas
     return value, min(min(until) / case.t_end, 1.0)
 
 
-def _split(judge_: _Judge) -> Iterator[Verdict]:
-    """How much of the worst error is importer's, model's and step's, and the largest of each anywhere."""
+def _split(judge_: _Judge, wholes: Mapping[str, float]) -> Iterator[Verdict]:
+    """How much of the worst error is importer's, model's and step's, and the largest of each anywhere.
+
+    Args:
+        judge_: of the run.
+        wholes: its errors, by metric, as these measure them.
+    """
     entry = judge_.entry
     if entry.run is None or (entry.study is None and entry.own is None):
         return
@@ -438,6 +460,17 @@ def _split(judge_: _Judge) -> Iterator[Verdict]:
         return
     for name, parts in found.items():
         yield from (row for part in PARTS for row in _part(judge_, name, part, parts, metrics.load(name).UNIT))
+        yield from _unlike(judge_, name, parts, wholes.get(name, math.nan))
+
+
+def _unlike(judge_: _Judge, name: str, found: Split, whole: float) -> Iterator[Verdict]:
+    """What parts add up to, where that is not the whole error: they are told one from the other by other code."""
+    own, total = judge_.entry.own, sum(found.there.values())
+    shorter = own is not None and own.trusted < judge_.truth.trusted
+    if shorter or "model" not in found.there or not abs(total - whole) > SUM * abs(whole) + ROUNDING:
+        return
+    why = f"All parts of an error of {whole:.3g} at its worst place add up to {total:.3g}."
+    yield judge_.row(f"{name} (parts)", total, metrics.load(name).UNIT, Word.OUTSIDE, why, limit=SUM)
 
 
 def _part(judge_: _Judge, name: str, part: str, found: Split, unit: str) -> Iterator[Verdict]:

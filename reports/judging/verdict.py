@@ -14,6 +14,8 @@ FACTOR = 2.0
 """A known property takes an engine between a FACTOR-th of what a stored run gave and FACTOR times it."""
 BAND = 10.0
 """A number that was right may become so many times what a stored run gave before it counts as lost."""
+NOUGHT = 1e-6
+"""A number that nothing limits is as good as none below, in its unit: it may be but a thousand default tolerances."""
 ROUNDING = 1e-12
 """Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
@@ -136,7 +138,8 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     """The word and the reason for one number.
 
     A claim without a limit must come out exactly. What is not finite is outside, even where
-    nothing is judged.
+    nothing is judged; so is a known deviation that is no more there: whatever took it away may
+    be in what measures it.
 
     Args:
         value: the number.
@@ -152,16 +155,31 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     said = "" if claim is None else f"{claim.expected:g} claimed: {claim.source}. "
     why = "" if limit is None else limit.why
     off = deviation(value, claim)
-    if off <= allowed:
+    known = limit is not None and limit.known != ""
+    sizes = explained(limit, stored) if limit is not None and known else None
+    if off <= allowed and (sizes is None or sizes[0] <= allowed):
         return Word.WITHIN, (said + why).strip()
-    if limit is None or not limit.known:
+    if limit is None or not known:
         return Word.OUTSIDE, (said + why).strip()
-    if (sizes := explained(limit, stored)) is None:
+    if sizes is None:
         return Word.INFO, f"Known, but its size has not been measured here: {limit.known}"
     least, most = sizes
     if least <= off <= most:
         return Word.EXPECTED, limit.known
     return Word.OUTSIDE, f"{said}A known property explains {least:.3g} to {most:.3g}: {limit.known}"
+
+
+def as_stored(value: float, shown: Limit | None, stored: float | None) -> tuple[Word, str]:
+    """The word for a number that nothing limits: that of its size, where a property is shown in any metric.
+
+    Args:
+        value: the number, finite.
+        shown: limit with the property; None where an engine has none that is.
+        stored: the number of a stored run with the same parameters and settings; None where there is none.
+    """
+    if shown is None or stored is None or not stored > FACTOR * NOUGHT:
+        return Word.INFO, ""
+    return judge(value, replace(shown, value=NOUGHT, known_least=0.0), None, stored)
 
 
 def band(stored: float | None, limit: Limit | None, claim: Claim | None = None) -> float:

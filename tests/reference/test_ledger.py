@@ -11,6 +11,7 @@ from wall_pendulum import wall_pendulum
 
 from crossbody import cases, engines
 from crossbody.cases import Outcome
+from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.reference import System, kernels, simulate
 
 SCENES = {
@@ -126,3 +127,18 @@ def test_what_rests_without_any_energy_has_an_account(mu: float, sunk: float) ->
     low = scene.replace(shapes=(floor, replace(box, position=(0.0, 0.0, 0.1))))
     found = run(low, [0, 0, -sunk * G / LAW.a0, 1, 0, 0, 0], np.zeros(6), 0.2, rtol=1e-9)
     assert found.outcome is Outcome.FINISHED, found.message
+
+
+@pytest.mark.parametrize("kind", ["slide", "hinge"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_spring_stores_the_work_that_its_force_takes_from_where_it_rests(kind: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    k, rest, q0 = rng.uniform(1.0, 20.0, 3), float(rng.normal()), float(rng.normal())
+    body = Body(name="mass", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    joint = Joint(name="way", body="mass", type=kind, axis=(0.0, 0.0, 1.0), stiffness=tuple(k), rest=(rest,))
+    case = cases.from_scene(Scene(bodies=(body,), joints=(joint,), gravity=(0.0, 0.0, 0.0)), q0=[q0], t_end=1.0)
+    motion = engines.load("reference").prepare(case, "compiled").run()
+    x = motion.q[:, 0] - rest
+    stored = k[0] * x**2 / 2.0 + k[1] * x**3 / 3.0 + k[2] * x**4 / 4.0
+    assert np.ptp(x) > 0.1
+    assert motion.energy[:, 1] == pytest.approx(stored, rel=1e-9, abs=1e-12 * stored.max())

@@ -54,6 +54,18 @@ def test_closed_forms_of_the_case_are_those_of_the_library(variant: str, mirrore
     assert pose.swing_period(p) == pytest.approx(2 * np.pi / delta.pendulum_rate(robot), rel=1e-15)
 
 
+@pytest.mark.parametrize("variant", ["light", "servos"])
+def test_a_sample_where_an_input_jumps_may_stand_on_either_side(variant: str) -> None:
+    """Its multipliers are those before the jump or behind it, and the law's are those behind it."""
+    case = load("delta_impulse", variant)
+    run = REFERENCE.prepare(case, "compiled").run()
+    assert case.inputs is not None
+    assert np.sum(np.isin(run.t, case.inputs.times[1:])) == 2 * len(case.inputs.times[1:]), "one on either side"
+    found = metrics.load("law_residual").measure(from_run(run, Tier.D, "itself"), run, case)
+    assert found is not None
+    assert found < 1e-12
+
+
 @each_impulse
 def test_impulse_agrees_with_an_independent_solution(variant: str) -> None:
     """Reference at rtol 1e-10 against Pinocchio's constrained dynamics by CVODE at 1e-13: 1e-10 m and 1e-8 N."""

@@ -20,12 +20,13 @@ from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports import metrics
 from crossbody.reports.commands import bands
-from crossbody.reports.judging import comparison, stored
+from crossbody.reports.judging import comparison, stored, verdict
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
+from crossbody.reports.judging.parts import Split
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
-from crossbody.reports.judging.verdict import FACTOR, Regression, Word, band, exit_code, judge, limit_for
+from crossbody.reports.judging.verdict import FACTOR, Regression, Word, as_stored, band, exit_code, judge, limit_for
 from crossbody.reports.measuring.truth import TRUTH, from_run
 from crossbody.reports.runs import jobs
 from crossbody.reports.runs.choice import picks
@@ -84,7 +85,7 @@ def test_a_number_that_is_missing_has_one_word(
     assert (row.expected, row.value) == pytest.approx((expected, math.nan), nan_ok=True)
     if hidden:
         assert (row.verdict, row.why) == (Word.INFO, "not shown")
-    elif limit == "covers none" and not claimed:
+    elif limit == "covers none" and not claimed and stored is None:
         assert (row.verdict, row.why) == (Word.INFO, "There is no such number. Known: it has none.")
     elif limit in ("known", "covers none") and stored is not None and math.isnan(stored):
         assert (row.verdict, row.why) == (Word.EXPECTED, "it has none")
@@ -105,6 +106,56 @@ def test_what_is_stored_of_a_run_that_fails_its_audit_is_all_that_is_measured(ca
     failed = replace(entry, audit=(row, replace(row, quantity="h", difference=0.0)))
     assert comparison.measured(case, failed, true) == pytest.approx(plain | {"audit M": 0.5}, nan_ok=True)
     assert {one.metric for one in judged(case, [failed], true, "") if one.engine == "fake"} == {"finished", "audit"}
+
+
+def test_a_number_of_the_stored_run_that_nobody_asks_for_any_more_is_outside(case: Case, motion: Trajectory) -> None:
+    entry, true = Entry(engine="fake", profile="good", run=motion), truth_of(case)
+    judge_ = comparison._Judge(case, entry, true, "run")
+    judge_.stored = {
+        "contacts": 3.0,
+        "bounces": math.nan,
+        "transitions": 1.0,
+        "audit M": 0.5,
+        "largest position (x)": 1.0,
+    }
+    [row] = comparison._vanished(judge_, {"transitions"})
+    assert (row.metric, row.verdict) == ("contacts", Word.OUTSIDE)
+
+
+@pytest.mark.parametrize("stored", [None, 0.02])
+@pytest.mark.parametrize(("value", "word"), [(1e-4, Word.WITHIN), (0.03, Word.EXPECTED), (0.05, Word.OUTSIDE)])
+@pytest.mark.parametrize("compared", [0.4, 0.6])
+def test_a_small_part_says_as_much_of_a_deviation_as_that_of_the_stored_run(
+    compared: float, value: float, word: Word, stored: float | None, case: Case, motion: Trajectory
+) -> None:
+    """A run by another law may share few events with the truth: what is within is not judged by them alone."""
+    judge_ = comparison._Judge(case, Entry(engine="fake", profile="good", run=motion), truth_of(case), "run")
+    judge_.limits = (replace(LIMIT, metric="x", known="it is known to do that", known_size=0.04),)
+    judge_.stored = {} if stored is None else {"x": stored}
+    if stored is not None and value == 1e-4:
+        word = Word.OUTSIDE  # no more as far off as stored
+    elif stored is None and compared < 0.5 and word != Word.OUTSIDE:
+        word = Word.INFO
+    assert judge_.judged("x", value, "1", judge_.truth, compared).verdict == word
+
+
+@given(
+    parts=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), off=st.sampled_from([0.0, 1e-6, -1e-6, math.nan]),
+    trusted=st.sampled_from([None, 0.5, 1.0]), missing=st.booleans(),
+)  # fmt: skip
+def test_parts_that_do_not_add_up_to_their_error_are_a_row(
+    parts: list[float], off: float, trusted: float | None, missing: bool, case: Case, motion: Trajectory
+) -> None:
+    """Where both look as far, and no part is missing."""
+    true = replace(from_run(motion, Tier.A, "itself"), trusted=1.0)
+    own = None if trusted is None else replace(true, trusted=trusted)
+    there = dict(zip(("importer", "step", "model"), parts, strict=True))
+    if missing:
+        del there["model"]
+    told = Split(where="q", there=there, largest=there, known=there, says="", missing={})
+    judge_ = comparison._Judge(case, Entry(engine="fake", profile="good", own=own), true, "run")
+    rows = list(comparison._unlike(judge_, "position", told, sum(parts) + off))
+    assert [row.verdict for row in rows] == [Word.OUTSIDE] * (abs(off) > 0.0 and trusted != 0.5 and not missing)
 
 
 @given(
@@ -170,7 +221,7 @@ def test_the_word_of_a_number_is_that_of_the_first_that_speaks(
         wanted = Word.OUTSIDE
     elif not limited:
         wanted = Word.INFO if not claimed else Word.WITHIN if value == 0.0 else Word.OUTSIDE
-    elif value <= 1.0:
+    elif value <= 1.0 and not (known and sizes[0] > 1.0):
         wanted = Word.WITHIN
     elif not known:
         wanted = Word.OUTSIDE
@@ -179,6 +230,22 @@ def test_the_word_of_a_number_is_that_of_the_first_that_speaks(
     else:
         wanted = Word.EXPECTED if sizes[0] <= value <= sizes[1] else Word.OUTSIDE
     assert judge(said, limit if limited else None, claim, stored)[0] == wanted
+
+
+@given(
+    value=st.floats(-1.0, 1.0), stored=st.one_of(st.none(), st.just(math.nan), st.floats(0.0, 1.0)),
+    shown=st.booleans(),
+)  # fmt: skip
+def test_a_number_without_a_limit_is_held_to_that_of_the_stored_run_where_a_property_shows_everywhere(
+    value: float, stored: float | None, shown: bool
+) -> None:
+    """By half to twice of it, where half of it is more than nothing."""
+    everywhere = Limit(metric="*", known="it is known to do that")
+    if not shown or stored is None or not stored / FACTOR > verdict.NOUGHT:
+        wanted = Word.INFO
+    else:
+        wanted = Word.EXPECTED if stored / FACTOR <= abs(value) <= stored * FACTOR else Word.OUTSIDE
+    assert as_stored(value, everywhere if shown else None, stored)[0] == wanted
 
 
 def test_the_reason_of_a_known_deviation_is_told() -> None:
@@ -579,6 +646,8 @@ def test_a_known_deviation_is_stored_as_the_run_has_it_and_anything_else_at_its_
     known = bands._known(load("newtons_cradle", "sliders"), Entry(engine="pinocchio", profile="law"))
     assert "touch_count" in known
     assert "start_error" not in known
+    known = bands._known(load("newtons_cradle", "sliders"), Entry(engine="mujoco", profile="default"))
+    assert "penetration" in known, "which nothing limits"
     found = bands._largest({"a": 1.0, "b": 1.0, "c": 1.0}, {"a": 3.0, "b": 3.0}, frozenset({"a"}))
     assert found == {"a": 1.0, "b": 3.0, "c": 1.0}
 
