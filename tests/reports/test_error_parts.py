@@ -20,6 +20,7 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines.mujoco._build import MAX_IMPEDANCE, without_regularisation
 from crossbody.reports import metrics
+from crossbody.reports.judging import comparison
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
 from crossbody.reports.judging.reach import BUDGET
@@ -287,6 +288,33 @@ def test_softness_is_an_error_of_the_model_at_any_step(tmp_path: Path, solref: s
     assert models[0].value > 10.0 * models[0].known
     steps = [rows["largest position (step)"].value for rows in (one, two)]
     assert steps[0] / steps[1] == pytest.approx(4.0, rel=0.15)
+
+
+@pytest.fixture(scope="module")
+def ball() -> tuple[Case, Any]:
+    case = cases.load("bouncing_ball", "linear")
+    return case, jobs.run_case(case, choice.picks(["mujoco:matched"]))
+
+
+@pytest.mark.parametrize(
+    ("metric", "factor", "told"),
+    [("position", 0.5, True), ("position", 2.0, True), ("event_times", 0.5, True), ("event_times", 2.0, False)],
+)
+def test_parts_that_are_not_the_whole_error_are_outside(
+    ball: tuple[Case, Any], monkeypatch: pytest.MonkeyPatch, metric: str, factor: float, told: bool
+) -> None:
+    """But those of instants may be more than what slow guards leave of it."""
+
+    def off(*given: Any) -> dict[str, Split]:
+        found = splits(*given)
+        there = {part: factor * value for part, value in found[metric].there.items()}
+        return {**found, metric: replace(found[metric], there=there)}
+
+    case, result = ball
+    monkeypatch.setattr(comparison, "splits", off)
+    rows = {row.metric: row for row in judged(case, result.entries, result.truth, "crossbody run")}
+    outside = {name for name, row in rows.items() if row.verdict is Word.OUTSIDE}
+    assert outside == ({f"{metric} (parts)"} if told else set())
 
 
 def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
