@@ -127,8 +127,8 @@ def _limits(
     for metric, (value, why) in wanted.items():
         yield Limit(
             metric=metric, value=value, engine=engine, profile=profile, why=why, known=known,
-            known_size=sizes.get(metric, 0.0),
+            known_size=sizes.get(metric, 0.0), covers_none=True,
         )  # fmt: skip
-    yield Limit(metric="*", engine=engine, profile=profile, known=known)
+    yield Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
     if (engine, profile) not in _LAW:
         yield Limit(metric="audit", engine=engine, profile=profile, known=known)

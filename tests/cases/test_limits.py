@@ -12,6 +12,7 @@ from friction_scenes import sphere_on_floor
 from crossbody import cases
 from crossbody.cases import Case, Limit
 from crossbody.cases.defaults import KNOWN, limits_of
+from crossbody.reports import metrics
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.verdict import limit_for
 
@@ -48,6 +49,21 @@ def test_a_wider_limit_of_one_engine_is_needed(name: str) -> None:
     wide = [(key, numbers) for key, numbers in worst.items() if numbers[0] > WIDE * numbers[2]]
     assert idle == []
     assert wide == []
+
+
+@pytest.mark.parametrize("name", cases.names())
+def test_a_property_that_leaves_a_stored_run_without_a_number_does_so_with_any_parameters(name: str) -> None:
+    """Where nothing is stored a missing number would be outside; of the stored run it is a known deviation."""
+    for variant in cases.variants(name):
+        case = cases.load(name, variant)
+        limits = limits_of(case)
+        told = {claim.metric for claim in case.claims} | {  # or by an engine that hides what they need
+            name for name, metric in metrics.of(case).items() if getattr(metric, "NEEDS", "")
+        }
+        for who, run in stored._table()[case.label]["runs"].items():
+            lacking = {metric for metric, value in run["deviations"].items() if value == "nan"} - told
+            found = {metric: limit_for(limits, metric, *who.split(":")) for metric in lacking}
+            assert [(who, metric) for metric, one in found.items() if one and one.known and not one.covers_none] == []
 
 
 BALL = """

@@ -81,7 +81,7 @@ def _all(wanted: dict[str, tuple[float, str]], bilateral: bool, height: float) -
     for metric, (value, why) in wanted.items():
         yield Limit(metric=metric, value=value, why=why)
     for engine, profile, known in _KNOWN:
-        yield Limit(metric="*", engine=engine, profile=profile, known=known)
+        yield Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
     yield from peer_limits.ball(wanted, bilateral)
     if bilateral:
         yield Limit(metric="energy_drift", value=2e-5, why=_SMALL)

@@ -114,7 +114,7 @@ def _all(mechanism: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
     for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
     for (engine, profile), known in _OTHERS[rule].items():
-        yield Limit(metric="*", engine=engine, profile=profile, known=known)
+        yield Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
     if rule == "resolved":
         for metric in ("position", "energy_drift", "gap_error"):
             yield Limit(metric=metric, value=1e-5, engine="mujoco", profile="matched", why=_FIXED)

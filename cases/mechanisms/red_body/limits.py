@@ -82,6 +82,6 @@ def _all(variant: str, bounds: Bounds) -> Iterator[Limit]:
     for metric, (value, why) in _MATCHED_BOUNDS.items() if variant == "resolved" else ():
         yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=why)
     for (engine, profile), known in _KNOWN[variant].items():
-        yield Limit(metric="*", engine=engine, profile=profile, known=known)
+        yield Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
     for engine, profile, known in _OTHER_PHYSICS:
         yield Limit(metric="audit", engine=engine, profile=profile, known=known)
