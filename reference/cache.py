@@ -69,7 +69,19 @@ class Lean(CPUDispatcher):  # type: ignore[misc]
 
     def add_overload(self, cres: CompileResult) -> None:
         """Take what was compiled."""
+        self.keep_count(cres)
         super().add_overload(cres._replace(type_annotation=""))
+
+    def keep_count(self, cres: CompileResult) -> None:
+        """Refuse what hands out an array that it does not count: who counts would take a reference that nobody gave.
+
+        Raises:
+            TypeError: where memory would be freed while it is in use.
+        """
+        model = cres.target_context.data_model_manager[cres.signature.return_type]
+        if "_nrt" in self.targetoptions and model.contains_nrt_meminfo():
+            name = f"{self.py_func.__module__}.{self.py_func.__name__}"
+            raise TypeError(f"{name} returns {cres.signature.return_type}; its module counts no references to arrays.")
 
 
 class Compiled(Lean):
@@ -316,6 +328,7 @@ class Part(Lean):
 
     def add_overload(self, cres: CompileResult) -> None:
         """Take what was lowered: nothing that Python could call."""
+        self.keep_count(cres)
         entry = object()  # callers know the code by it
         cres.library.environment = (cres.fndesc.env_name, cres.environment)
         cres.library.finalize()
