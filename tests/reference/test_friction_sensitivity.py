@@ -155,7 +155,7 @@ def test_oblique_slide_in_space():
     np.testing.assert_allclose(found.by_start[:2, 3:5], differences(lambda v: where(v)[:2], v[:2], 1e-4), atol=1e-8)
 
 
-@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 4, 5, 6, 7))])
+@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (4, 5, 6, 7))])
 def test_tossed_bodies(seed):
     """Touches with friction, slips that turn, stops, slides out of sticking and releases, in space."""
     scene, q, v, _ = tossed(seed, most=1)
@@ -170,6 +170,14 @@ def test_a_slide_out_of_sticking_that_lifts_at_once():
     made = system(scene, case_of(scene).law)
     found = compared(made, q, v, 0.19, step=1e-4, close=1e-7, runs=1e-13)
     assert kinds(found)[-2:] == [("STICK", "SLIP"), ("SLIP", "BALLISTIC")]
+
+
+@pytest.mark.slow
+def test_a_slide_of_nanoseconds_is_refused():
+    """Of 85 out of sticking: its slip never comes out of the rounding of the velocities."""
+    scene, q, v, _ = tossed(1, most=1)
+    with pytest.raises(SceneError, match=r"row 0 slides at t = 0\.09256\d* s for so short a time"):
+        sensitivity(system(scene, case_of(scene).law), q, v, 0.3, rtol=1e-10)
 
 
 def test_a_slide_of_no_length_is_refused(monkeypatch):
