@@ -35,12 +35,12 @@ def dynamics(t: float, q: Array, v: Array, u: Array, p: Array, M: Array, f: Arra
     code = p[layout.TRACED].real if q.itemsize == REAL else 0.0
     if code == 0.0 or p[layout.SPANNED].real > 0.0:
         sweeps.outwards(q, v, p, w)
-    if p[layout.BOUNDED].real > 0.0:
+    if len(u) > 0 and p[layout.BOUNDED].real > 0.0:
         sums = w[len(w) - len(f) :]
         forces.driven(t, q, v, u, p, w, sums)
         for j in range(len(f)):
             f[j] += sums[j]
-    elif p[layout.EXERTING].real > 0.0:
+    elif len(u) > 0 and p[layout.EXERTING].real > 0.0:
         forces.actuated(t, q, v, u, p, w, f)
     if p[layout.SPANNED].real > 0.0:
         forces.stretched(p, w, f)

@@ -105,7 +105,7 @@ def power(t: float, q: Array, v: Array, u: Array, p: Array, e: Array) -> None:
     given, taken = 0.0 * v[0], 0.0 * v[0]
     needed = p[layout.PUSHES].real > 0.0 or p[layout.SPANNED].real > 0.0
     w = posed(q, v, p) if needed else np.empty(0, dtype=q.dtype)
-    if p[layout.BOUNDED].real > 0.0 or p[layout.EXERTING].real > 0.0:
+    if len(u) > 0 and (p[layout.BOUNDED].real > 0.0 or p[layout.EXERTING].real > 0.0):
         sums = np.empty(n, dtype=q.dtype)
         forces.driven(t, q, v, u, p, w, sums)
         for j in range(n):

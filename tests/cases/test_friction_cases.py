@@ -212,9 +212,8 @@ def test_a_creep_that_is_predicted_has_two_bounds() -> None:
     assert judge(value or 0.0, found, None)[0] is Word.EXPECTED
     middle = 0.5 * (found.known_least + found.known_size)
     assert value == pytest.approx(middle, rel=1e-2)
-    for factor in (0.9, 1.1):
+    for factor in (0.0, 0.9, 1.1):  # also where it is gone: what took it away may be in what measures it
         assert judge(factor * middle, found, None)[0] is Word.OUTSIDE
-    assert judge(0.0, found, None)[0] is Word.WITHIN
 
 
 def test_what_tips_has_no_exact_motion() -> None:
