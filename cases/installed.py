@@ -42,7 +42,7 @@ _FILES: dict[Path, ModuleType] = {}
 _OWN: dict[str, str] = {}
 """File of a user's own that was imported -> what it is called in messages."""
 OURS = tuple(
-    str(Path(__file__).parents[1] / folder / "_")[:-1] for folder in ("cases", "engines", "hw", "reference", "reports")
+    os.path.join(Path(__file__).parents[1], folder, "") for folder in ("cases", "engines", "hw", "reference", "reports")
 )
 """How the paths of crossbody's own modules begin; a checkout may hold an environment with other libraries too."""
 

@@ -470,9 +470,8 @@ def _unlike(judge_: _Judge, name: str, found: Split, whole: float) -> Iterator[V
     """
     own, total = judge_.entry.own, sum(found.there.values())
     shorter = own is not None and own.trusted < judge_.truth.trusted
-    if shorter or "model" not in found.there or not abs(total - whole) > SUM * abs(whole) + ROUNDING:
-        return
-    if name == "event_times" and total > whole:
+    off = whole - total if name == "event_times" else abs(total - whole)
+    if shorter or "model" not in found.there or not off > SUM * abs(whole) + ROUNDING:
         return
     why = f"All parts of an error of {whole:.3g} at its worst place add up to {total:.3g}."
     yield judge_.row(f"{name} (parts)", total, metrics.load(name).UNIT, Word.OUTSIDE, why, limit=SUM)

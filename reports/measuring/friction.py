@@ -130,11 +130,13 @@ def guard(truth: Trajectory, case: Case, pair: int, slides: bool) -> tuple[Calla
         found = rubbed(run, case)
         assert found is not None
         mode = run.mode[:, found.rows]
-        below: Floats = found.mu * found.normal - np.linalg.norm(found.force, axis=-1)
+        if slides:
+            below = found.mu * found.normal - np.linalg.norm(found.force, axis=-1)
+            least: Floats = np.where((mode == Mode.STICK) & own, below, np.inf).min(axis=1)
+            return least
         touches = np.isin(mode, (Mode.STICK, Mode.SLIP)) & own
-        least: Floats = np.where((mode == Mode.STICK) & own, below, np.inf).min(axis=1)
         fastest: Floats = np.where(touches, np.linalg.norm(found.slip, axis=-1), -np.inf).max(axis=1)
-        return least if slides else fastest
+        return fastest
 
     return values, known
 

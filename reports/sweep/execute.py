@@ -93,10 +93,7 @@ def _try(spec: Spec) -> Tried:
         tried.outcome, tried.message = SKIPPED, str(error)
     except CrossbodyError as error:
         tried.outcome, tried.message = REFUSED, str(error)
-    except (
-        Exception,
-        SystemExit,
-    ) as error:  # the point of a stress run: whatever an engine throws is a row, not the end
+    except (Exception, SystemExit) as error:  # a stress run has a row for whatever an engine throws, and goes on
         tried.outcome, tried.message = EXCEPTION, f"{type(error).__name__}: {error}"
         tried.broken = "".join(traceback.format_tb(error.__traceback__)[-2:]).strip()
     return tried
