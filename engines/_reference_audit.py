@@ -38,8 +38,7 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
     def lam(q: Floats, v: Floats) -> Floats:
         if system.nc > len(v):
             return np.full(system.nc, np.nan)
-        mass, f = system.terms(q, v)
-        rows, h, Hdv = system.constraint(q, v)
+        mass, f, rows, h, Hdv = (part[0] for part in system.equations_along([0.0], q[None], v[None]))
         a0, a1, a2 = law.T
         inverse = np.linalg.solve(mass, np.column_stack([rows.T, f]))
         push = rows @ inverse[:, -1] + Hdv + a1 * (rows @ v) + a0 * h + a2 * h**3

@@ -8,9 +8,11 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.installed import from_file
+from crossbody.cases.remembered import remembered
 from crossbody.reference import System
 
 SYSTEMS = "crossbody.reference.systems"
@@ -43,6 +45,11 @@ def known(case: Case) -> bool:
     return case.scene is not None or builder(case.mechanism) is not None
 
 
+@remembered(4)
+def _built(build: Callable[..., System], parameters: Any, law: Any) -> System:
+    return build(parameters, law)
+
+
 def system_of(case: Case, traced: bool | None = None) -> System:
     """The mechanism with the law of its rows: kernels of its own, where there are some, or those of every scene.
 
@@ -54,7 +61,7 @@ def system_of(case: Case, traced: bool | None = None) -> System:
         CaseUnsupported: if the reference has no equations of it.
     """
     if (build := builder(case.mechanism)) is not None:
-        return build(case.parameters, case.law)
+        return _built(build, case.parameters, case.law)
     if case.scene is None:
         raise CaseUnsupported(f"The reference has no equations of the mechanism {case.mechanism!r}.")
     from crossbody.reference.tree.system import system

@@ -398,23 +398,47 @@ class System:
         self, q: ArrayLike, v: ArrayLike | None = None, u: ArrayLike | None = None, t: float = 0.0
     ) -> tuple[Floats, Floats]:
         """M(q) dense (n, n) and f(t, q, v, u) (n,) in the discrete state of the start."""
-        n, k = self.n, self.mass_block
-        blocks, f = np.zeros((n, k)), np.zeros(n)
-        self.dynamics(t, *self._state(q, v), self._input(u), np.array(self.p), blocks, f, np.zeros(self.scratch))
-        M = np.zeros((n, n))
-        for b in range(0, n, k):
-            M[b : b + k, b : b + k] = blocks[b : b + k]
-        return M, f
+        q_, v_ = self._state(q, v)
+        M, f, *_ = self._equations(np.array([t]), q_[None], v_[None], self._input(u)[None])
+        return M[0], f[0]
 
     def constraint(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
         """All rows at (q, v): H (nc, n), h (nc,) and H' v (nc,)."""
-        H, h, Hdv = np.zeros((self.nc, self.n)), np.zeros(self.nc), np.zeros(self.nc)
         q_, v_ = self._state(q, v)
-        w = np.zeros(self.scratch)
-        blocks, f = np.zeros((self.n, self.mass_block)), np.zeros(self.n)
-        self.dynamics(0.0, q_, v_, self._input(None), np.array(self.p), blocks, f, w)
-        self.rows(0.0, q_, v_, np.array(self.p), w, np.arange(self.nc), self.nc, H, h, Hdv)
-        return H, h, Hdv
+        _, _, H, h, Hdv = self._equations(np.zeros(1), q_[None], v_[None], self._input(None)[None])
+        return H[0], h[0], Hdv[0]
+
+    def equations_along(
+        self, t: ArrayLike, q: ArrayLike, v: ArrayLike, u: ArrayLike | None = None
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """What the mechanism is at m instants of a motion, in the discrete state of its start.
+
+        Args:
+            t: instants (m,), s.
+            q: positions (m, nq).
+            v: velocities (m, n).
+            u: inputs (m, inputs); zeros if not given.
+
+        Returns:
+            M (m, n, n) and f (m, n), H (m, nc, n), h (m, nc) and H'v (m, nc).
+        """
+        places, times = self._copied("q", q, (None,)), frozen("simulate", "t", t, (None,))
+        speeds = self._copied("v", v, (len(places),))
+        given = np.zeros((len(places), self.inputs)) if u is None else u
+        return self._equations(times, places, speeds, frozen("simulate", "u", given, (len(places), self.inputs)))
+
+    def _equations(self, t: Floats, q: Floats, v: Floats, u: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        m, n, k, p, every = len(q), self.n, self.mass_block, np.array(self.p), np.arange(self.nc)
+        q, u, w = np.ascontiguousarray(q), np.array(u), np.zeros((m, self.scratch))
+        blocks, f = np.zeros((m, n, k)), np.zeros((m, n))
+        H, h, Hdv = np.zeros((m, self.nc, n)), np.zeros((m, self.nc)), np.zeros((m, self.nc))
+        for i in range(m):
+            self.dynamics(t[i], q[i], v[i], u[i], p, blocks[i], f[i], w[i])
+            self.rows(t[i], q[i], v[i], p, w[i], every, self.nc, H[i], h[i], Hdv[i])
+        M = np.zeros((m, n, n))
+        for b in range(0, n, k):
+            M[:, b : b + k, b : b + k] = blocks[:, b : b + k]
+        return M, f, H, h, Hdv
 
     def gap(self, q: ArrayLike, v: ArrayLike | None = None) -> tuple[Floats, Floats]:
         """Gaps and their rates (nc,) at (q, v)."""

@@ -37,78 +37,87 @@ other, as in the reference. What such rows carry together is unique, how they sh
 def multipliers(
     system: System,
     case: Case,
-    t: float,
-    q: Floats,
-    v: Floats,
+    run: Trajectory,
+    at: NDArray[np.intp],
     rows: NDArray[np.intp],
+    slides: NDArray[np.intp],
     fast: NDArray[np.bool_],
-    inputs: Inputs | None = None,
-    pushed: Floats | float = 0.0,
+    inputs: Inputs | None,
 ) -> tuple[Floats, Floats]:
     """Multipliers that the law asks for with some rows active, and what makes of any the part that exerts a force.
 
     Args:
         system: the equations.
         case: with the law.
-        t: instant, s.
-        q: positions (nq,).
-        v: velocities (n,).
-        rows: active ones (m,).
+        run: the motion, whose rows that slide carry what it says.
+        at: samples of it (m,), in all of which the same rows are closed.
+        rows: active ones (k,).
+        slides: those that slide.
         fast: which of all rows are in COLLISION.
-        inputs: those that act; the case's if not given.
-        pushed: further generalised forces (n,), of rows that slide.
+        inputs: those that act, if any.
 
     Returns:
-        lam (m,), and a projection (m, m).
+        lam (m, k), and projections (m, k, k).
     """
-    acting = case.inputs if inputs is None else inputs
-    M, f = system.terms(q, v, u=None if acting is None else acting.at(t), t=t)
-    H, h, Hdv = (part[rows] for part in system.constraint(q, v))
+    t, q, v = run.t[at], run.q[at], run.v[at]
+    M, f, H, h, Hdv = system.equations_along(t, q, v, None if inputs is None else inputs.at(t))
+    f += np.einsum("msn,ms->mn", H[:, slides], run.lam[np.ix_(at, slides)])
+    H, h, Hdv = H[:, rows], h[:, rows], Hdv[:, rows]
     law = case.law
     a0, a1 = (np.where(fast, b, a)[rows] for a, b in ((law.a0, law.b0), (law.a1, law.b1)))
     a2 = np.where(fast, 0.0, law.a2)[rows]
-    wanted = Hdv + a1 * (H @ v - np.asarray(system.drift)[rows]) + a0 * h + a2 * h**3
-    inverse = np.linalg.solve(M, np.column_stack([(f + pushed)[:, None], H.T]))
-    G = H @ inverse[:, 1:]
-    size, first = _sizes(system, np.diag(G), rows)
-    G, b = G / np.outer(size, size), -(H @ inverse[:, 0] + wanted) / size
+    rate = np.einsum("mkn,mn->mk", H, v) - np.asarray(system.drift)[rows]
+    inverse = np.linalg.solve(M, np.concatenate([f[..., None], H.swapaxes(1, 2)], axis=2))
+    G = H @ inverse[..., 1:]
+    size, first = _sizes(system, np.diagonal(G, axis1=1, axis2=2), rows)
+    G = G / (size[:, :, None] * size[:, None, :])
+    b = -(np.einsum("mkn,mn->mk", H, inverse[..., 0]) + Hdv + a1 * rate + a0 * h + a2 * h**3) / size
     whole = _inverse(G)
-    found = whole @ b if first.all() else _one_after_the_other(G, b, first)
-    moving: Floats = (whole @ G) * size / size[:, None]
+    found = _times(whole, b) if first.all() else _one_after_the_other(G, b, first)
+    moving: Floats = (whole @ G) * size[:, None, :] / size[:, :, None]
     return found / size, moving
+
+
+def _times(A: Floats, x: Floats) -> Floats:
+    """Return the products (m, i) of matrices (m, i, j) and vectors (m, j)."""
+    product: Floats = np.einsum("mij,mj->mi", A, x)
+    return product
 
 
 def _one_after_the_other(G: Floats, b: Floats, first: NDArray[np.bool_]) -> Floats:
     """Return x with G x = b on the first rows, and on the others as near as that leaves."""
-    found, N, S = np.zeros(len(b)), np.flatnonzero(first), np.flatnonzero(~first)
-    turn = _inverse(G[np.ix_(N, N)])
-    held = G[np.ix_(S, N)] @ turn
-    found[S] = _inverse(G[np.ix_(S, S)] - held @ G[np.ix_(N, S)]) @ (b[S] - held @ b[N])
-    found[N] = turn @ (b[N] - G[np.ix_(N, S)] @ found[S])
+    N, S = np.flatnonzero(first), np.flatnonzero(~first)
+    at_N, at_S, between = G[:, N[:, None], N], G[:, S[:, None], S], G[:, N[:, None], S]
+    turn = _inverse(at_N)
+    held = between.swapaxes(1, 2) @ turn
+    found = np.zeros(b.shape)
+    found[:, S] = _times(_inverse(at_S - held @ between), b[:, S] - _times(held, b[:, N]))
+    found[:, N] = _times(turn, b[:, N] - _times(between, found[:, S]))
     return found
 
 
 def _sizes(system: System, own: Floats, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return what rows are measured by, and which are fulfilled first: all but those of friction that holds.
+    """Return what rows are measured by (m, k), and which are fulfilled first: all but those of friction that holds.
 
     Those of contacts of a body that rocks contradict each other, and are met by least squares in
     what the others leave, each by the size of its contact.
     """
     size, leader = np.sqrt(own), np.asarray(system.follows)[rows]
     first = np.array([i < 0 or not system.tangents[i] for i in leader], dtype=bool)
-    at = {row: k for k, row in enumerate(rows.tolist())}
+    place = {row: k for k, row in enumerate(rows.tolist())}
     for k in np.flatnonzero(~first):
-        size[k] = max(size[k], size[at.get(int(leader[k]), int(k))])
+        size[:, k] = np.maximum(size[:, k], size[:, place.get(int(leader[k]), int(k))])
     return np.where(size == 0.0, 1.0, size), first
 
 
 def _inverse(G: Floats) -> Floats:
-    """Return the inverse of a symmetric matrix, on the part of it that has one."""
-    if not len(G):
+    """Return the inverses of symmetric matrices (m, k, k), each on the part of it that has one."""
+    if not G.shape[1]:
         return G
     values, ways = np.linalg.eigh(G)
-    kept = values > DEPENDENT * values[-1]
-    inverse: Floats = (ways[:, kept] / values[kept]) @ ways[:, kept].T
+    kept = values > DEPENDENT * values[:, -1:]
+    turned = np.divide(1.0, values, out=np.zeros(values.shape), where=kept)
+    inverse: Floats = (ways * turned[:, None, :]) @ ways.swapaxes(1, 2)
     return inverse
 
 
@@ -136,14 +145,16 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         looked &= ~np.isin(run.t, inputs.times)
     worst, scale = off_slip(run, case), 0.0
     slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
-    for i in spread(run, looked):
-        rows = np.flatnonzero(closed[i] & ~slides[i])
+    chosen = spread(run, looked)
+    patterns, which = np.unique(
+        np.stack([closed & ~slides, slides, run.mode == Mode.COLLISION], axis=1)[chosen], axis=0, return_inverse=True
+    )
+    for k, (active, sliding, fast) in enumerate(patterns):
+        at, rows = chosen[which.ravel() == k], np.flatnonzero(active)
         if not len(rows):  # dry friction that slides, which has no law but its bound
-            scale = max(scale, float(np.max(np.abs(run.lam[i]))))
+            scale = max(scale, float(np.max(np.abs(run.lam[at]))))
             continue
-        fast = run.mode[i] == Mode.COLLISION
-        pushed = system.constraint(run.q[i])[0][slides[i]].T @ run.lam[i, slides[i]] if slides[i].any() else 0.0
-        lam, moving = multipliers(system, case, run.t[i], run.q[i], run.v[i], rows, fast, inputs, pushed)
-        worst = max(worst, float(np.max(np.abs(moving @ (run.lam[i, rows] - lam)))))
+        lam, moving = multipliers(system, case, run, at, rows, np.flatnonzero(sliding), fast, inputs)
+        worst = max(worst, float(np.max(np.abs(_times(moving, run.lam[np.ix_(at, rows)] - lam)))))
         scale = max(scale, float(np.max(np.abs(lam))))
     return worst / max(scale, idle(truth.trajectory)) if scale else None
