@@ -23,6 +23,7 @@ NUMBERS = ("masses", "gravity", "constants", "q0", "v0")
 FUNCTIONS = ("M", "bias", "H", "lam")
 STATES = 20
 NEWTON = 20
+ROUNDED = 1e-12  # part of a gap by which it may miss what was drawn
 SEED = 20240917
 
 
@@ -97,7 +98,10 @@ def _entered(case: Case, gap: Any, H: Any, draw: np.random.Generator) -> tuple[F
     wanted = -1e-2 * np.maximum(np.abs(gap(case.q0)), 1e-3) * draw.uniform(0.01, 1.0, len(case.law.a0))
     q: Floats = np.array(case.q0)
     for _ in range(NEWTON):
-        q = q + np.linalg.lstsq(H(q), wanted - gap(q))[0]
+        off = wanted - gap(q)
+        if np.all(np.abs(off) <= ROUNDED * np.abs(wanted)):
+            break
+        q = q + np.linalg.lstsq(H(q), off)[0]
     rates = -draw.uniform(0.0, 1.0, len(case.law.a0))
     return q, np.linalg.lstsq(H(q), rates)[0]
 
