@@ -158,3 +158,18 @@ def test_what_comes_later_changes_nothing_that_is_said_of_contacts_before(seed: 
         ]
         assert list(contacts(part)) == wanted
         assert [each[1:] for each in rates(part)] == [each[1:] for each in rates(whole) if each[0].release <= t]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_gaps_that_are_straight_between_samples_touch_and_part_where_they_vanish(seed: int) -> None:
+    """A run that knows no modes: gap = slope (t - zero) at the samples on either side of every zero."""
+    rng = np.random.default_rng(seed)
+    zeros = np.cumsum(rng.uniform(1.0, 3.0, 6))
+    t = (zeros[:, None] + rng.uniform(0.05, 0.45, (6, 2)) * [-1.0, 1.0]).ravel()
+    gap = np.repeat(rng.uniform(0.1, 10.0, 6) * np.tile([-1.0, 1.0], 3), 2) * (t - np.repeat(zeros, 2))
+    one = told([OPEN, FLUSH])
+    rows = {name: np.zeros((len(t), *getattr(one, name).shape[1:])) for name in ("q", "v", "lam", "energy")}
+    mode = np.full((len(t), 1), -1, dtype=one.mode.dtype)
+    run = replace(one, t=t, gap=gap[:, None], mode=mode, events=(), ledger=None, **rows)
+    found = np.array([(c.touch, c.release) for c in contacts(run)])
+    np.testing.assert_allclose(found.ravel(), zeros, rtol=1e-14)
