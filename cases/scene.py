@@ -63,24 +63,48 @@ class _Named:
     sizes: ClassVar[dict[str, int]] = {}
 
     def __post_init__(self) -> None:
-        """Bring vectors to tuples of their length and check that every number is finite."""
+        """Bring vectors to tuples of their length and check that every number but a bound is finite."""
         what = f"{type(self).__name__} {self.name!r}"
         if not isinstance(self.name, str) or not self.name:
             raise SceneError(f"{type(self).__name__}.name is {shown(self.name)}; it must be a text.")
         for name, size in self.sizes.items():
-            object.__setattr__(self, name, _vector(f"{what}: {name}", getattr(self, name), size))
+            check = _bounds if name.endswith("range") else _turn if name == "orientation" else _vector
+            object.__setattr__(self, name, check(f"{what}: {name}", getattr(self, name), size))
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, float) and math.isnan(value):
-                raise SceneError(f"{what}: {field.name} is not a number.")
+            if isinstance(value, float) and not math.isfinite(value):
+                raise SceneError(f"{what}: {field.name} is {value}; it must be finite.")
 
 
 def _vector(where: str, value: Any, size: int) -> Vector:
+    found = _numbers(where, value, size)
+    if not all(map(math.isfinite, found)):
+        raise SceneError(f"{where} is {shown(value)}; it must be finite.")
+    return found
+
+
+def _turn(where: str, value: Any, size: int) -> Vector:
+    """Return a quaternion, of any length that is a number."""
+    found = _vector(where, value, size)
+    if not 0.0 < sum(number * number for number in found) < math.inf:
+        raise SceneError(f"{where} is {shown(value)}; a quaternion has a length above 0 that is finite.")
+    return found
+
+
+def _bounds(where: str, value: Any, size: int) -> Vector:
+    """Return the lowest and the highest value that something may have; infinite where there is no such bound."""
+    low, high = found = _numbers(where, value, size)
+    if not (low <= high and low < math.inf and high > -math.inf):
+        raise SceneError(f"{where} is {shown(value)}; it must be the lowest and the highest value.")
+    return found
+
+
+def _numbers(where: str, value: Any, size: int) -> Vector:
     try:
         found = tuple(float(number) for number in value)
     except (TypeError, ValueError):
-        raise SceneError(f"{where} is {shown(value)}; it must be {size} numbers.") from None
-    if len(found) != size or any(math.isnan(number) for number in found):
+        found = ()
+    if len(found) != size or any(map(math.isnan, found)):
         raise SceneError(f"{where} is {shown(value)}; it must be {size} numbers.")
     return found
 
@@ -160,7 +184,8 @@ class Joint(_Named):
         object.__setattr__(self, "axis", tuple(number / length for number in self.axis))
         size = 4 if self.type in ("ball", "free") else 1
         rest = UPRIGHT if size == 4 and len(self.rest) == 1 else self.rest
-        object.__setattr__(self, "rest", _vector(f"Joint {self.name!r}: rest", rest, size))
+        check = _turn if size == 4 else _vector
+        object.__setattr__(self, "rest", check(f"Joint {self.name!r}: rest", rest, size))
         if size == 4 and self.limited:
             self._put_angle()
 
@@ -215,8 +240,6 @@ class Shape(_Named):
             raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; a hull alone has them.")
         found = tuple(_vector(f"{what}: corner {k}", corner, 3) for k, corner in enumerate(self.corners))
         object.__setattr__(self, "corners", found)
-        if not np.isfinite(found).all():
-            raise SceneError(f"{what} has a corner at infinity; all its corners must be finite.")
         if found and not _thickness(found) > FLAT:
             raise SceneError(f"{what} has {len(found)} corners that lie in a plane; a hull has four that do not.")
 
@@ -417,8 +440,7 @@ class Actuator(_Named):
             raise SceneError(
                 f"{what}: time_constant is {shown(self.time_constant)}; a filter alone has one, above 0 s."
             )
-        if not self.activation_range[0] <= self.activation_range[1]:
-            raise SceneError(f"{what}: activation_range is {list(self.activation_range)}; it must not fall.")
+        object.__setattr__(self, "gear", _vector(f"{what}: gear", self.gear, np.size(self.gear)))
         if self.tendon and self.armature:
             raise SceneError(
                 f"Actuator {self.name!r} has armature on a tendon, which would join branches in M: not done."

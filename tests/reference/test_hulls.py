@@ -383,7 +383,7 @@ COLLADA = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11
     ("corners", "told"),
     [(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "3 corners that lie in a plane"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1e-9)), "4 corners that lie in a plane"),
-     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.inf)), "a corner at infinity"),
+     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.inf)), "must be finite"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.nan)), "corner 3 is .* must be 3 numbers"),
      (((0.0, 0.0), (1.0, 0.0)), "corner 0 is .* must be 3 numbers"), ((), "a hull alone has them")],
 )  # fmt: skip

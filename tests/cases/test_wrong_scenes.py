@@ -1,0 +1,101 @@
+"""What a part of a scene, and a scene, refuse: what is wrong, where, and what would be valid."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import pytest
+
+from crossbody.cases import SceneError
+from crossbody.cases.scene import Actuator, Body, Joint, Loop, Pair, Scene, Shape, Tendon
+
+PARTS: dict[type, dict[str, Any]] = {
+    Body: {"name": "a"},
+    Joint: {"name": "a", "body": "b", "type": "hinge"},
+    Shape: {"name": "a"},
+    Pair: {"name": "a", "first": "b", "second": "c"},
+    Loop: {"name": "a", "type": "connect", "first": "b"},
+    Tendon: {"name": "a", "joints": ("b",), "coefficients": (1.0,)},
+    Actuator: {"name": "a", "joint": "b"},
+}
+NUMBERS = [
+    (kind, field.name, value)
+    for kind, given in PARTS.items()
+    for field in dataclasses.fields(kind)
+    for value in [getattr(kind(**given), field.name)]
+    if isinstance(value, float) or (isinstance(value, tuple) and value and isinstance(value[0], float))
+]
+
+
+@pytest.mark.parametrize(("kind", "field", "value"), NUMBERS)
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+def test_every_number_of_a_part_is_finite_but_what_is_no_bound(
+    kind: type, field: str, value: Any, wrong: float
+) -> None:
+    """Of a range the lower may be missing, which is -inf, and the upper, which is inf."""
+    for place in range(len(value) if isinstance(value, tuple) else 1):
+        changed = wrong if isinstance(value, float) else (*value[:place], wrong, *value[place + 1 :])
+        if field.endswith("range") and wrong == (-math.inf, math.inf)[place]:
+            kind(**PARTS[kind], **{field: changed})
+        else:
+            with pytest.raises(SceneError, match=rf"{kind.__name__} 'a': (friction|{field})"):
+                kind(**{**PARTS[kind], field: changed})
+
+
+WRONG: list[tuple[type, dict[str, Any], str]] = [
+    (Body, {"name": ""}, "Body.name is ''; it must be a text"),
+    (Body, {"com": (0.0, 0.0)}, "com is .*; it must be 3 numbers"),
+    (Body, {"mass": "1", "com": "abc"}, "com is 'abc'; it must be 3 numbers"),
+    *[
+        (kind, {"orientation": (size, 0.0, 0.0, 0.0)}, "a quaternion has a length above 0")
+        for kind in (Body, Shape, Loop) for size in (0.0, 1e-200, 1e200)
+    ],
+    (Joint, {"type": "ball", "rest": (0.0,) * 4}, "rest .* a quaternion has a length above 0"),
+    (Joint, {"type": "screw"}, "type is 'screw'; valid: "),
+    (Joint, {"axis": (0.0, 0.0, 0.0)}, "axis is .* must not be zero"),
+    (Joint, {"range": (1.0, -1.0)}, "range is .*; it must be the lowest and the highest"),
+    (Joint, {"type": "free", "range": (0.0, 1.0)}, "a free joint has no bounds"),
+    (Joint, {"type": "ball", "range": (0.5, 1.0)}, "a ball joint has 0 and its largest angle"),
+    (Joint, {"friction_loss": -1.0}, "friction_loss is -1.0; it must be at least 0"),
+    (Shape, {"type": "hull"}, "has 0 corners; a hull alone"),
+    (Shape, {"type": "hull", "corners": [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]}, "lie in a plane"),
+    (Shape, {"type": "hull", "corners": [(0.0, 0.0, math.inf)]}, "corner 0 is .* must be finite"),
+    (Pair, {"dimension": 2}, "dimension is 2; valid: "),
+    (Pair, {"friction": (-0.1, *[0.0] * 4)}, "friction is .* at least 0"),
+    (Loop, {"type": "glue"}, "type is 'glue'; valid: "),
+    (Tendon, {"bodies": ("b", "c")}, "it needs either"),
+    (Tendon, {"joints": (), "coefficients": (), "bodies": ("b", "c")}, "positions is .* a point of each body"),
+    (Tendon, {"coefficients": (1.0, 2.0)}, "coefficients is .*; it must be 1 numbers"),
+    (Actuator, {"activation": "spring"}, "activation is 'spring'; valid: "),
+    (Actuator, {"activation_range": (1.0, 0.0)}, "activation_range is .*; it must be the lowest and the highest"),
+    (Actuator, {"joint": "", "tendon": "t", "armature": 0.1}, "armature on a tendon"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "changes", "told"), WRONG)
+def test_a_part_says_what_is_wrong_with_it_and_what_would_be_valid(
+    kind: type, changes: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(SceneError, match=told):
+        kind(**{**PARTS[kind], **changes})
+
+
+ROD = Body(name="rod", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+HINGE = Joint(name="hinge", body="rod", type="hinge")
+ARM, TIP = Body(name="arm"), Body(name="tip", parent="rod")
+
+
+@pytest.mark.parametrize(("parts", "told"), [
+    ({"bodies": (ROD, ROD)}, "bodies has the name 'rod' twice"),
+    ({"gravity": (0.0, 0.0, math.inf)}, "Scene.gravity is .* must be finite"),
+    ({"joints": (dataclasses.replace(HINGE, body="bar"),)}, "Joint 'hinge': body is 'bar', which does not exist"),
+    ({"bodies": (ROD, dataclasses.replace(TIP, parent="bar"))}, "Body 'tip': parent is 'bar', which does not exist"),
+    ({"bodies": (ROD, TIP), "joints": (Joint(name="free", body="tip", type="free"),)}, "a free joint belongs to"),
+    ({"bodies": (ROD, ARM), "joints": (Joint(name="x", body="arm", type="slide"), HINGE)}, "the order of the bodies"),
+    ({"bodies": (ROD, ARM, TIP)}, "branch by branch"),
+])  # fmt: skip
+def test_a_scene_says_which_of_its_parts_do_not_go_together(parts: dict[str, Any], told: str) -> None:
+    with pytest.raises(SceneError, match=told):
+        Scene(**{"bodies": (ROD,), "joints": (HINGE,), **parts})
