@@ -173,3 +173,9 @@ def test_gaps_that_are_straight_between_samples_touch_and_part_where_they_vanish
     run = replace(one, t=t, gap=gap[:, None], mode=mode, events=(), ledger=None, **rows)
     found = np.array([(c.touch, c.release) for c in contacts(run)])
     np.testing.assert_allclose(found.ravel(), zeros, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("gap", "count"), [(1e-6, 2), (1e-9, 2), (1e-11, 1), (0.0, 1)])
+def test_contacts_are_one_where_nothing_opens_between_them_but_rounding(gap: float, count: int) -> None:
+    """A hop of a nanometre is one; what rounding leaves of the place of a row at rest is none."""
+    assert len(contacts(told([OPEN, DEEP, replace(OPEN, gap=gap), DEEP, OPEN]), joined=True)) == count
