@@ -370,6 +370,8 @@ class Tendon(_Named):
         _Named.__post_init__(self)
         what = f"Tendon {self.name!r}"
         _check_loss(self)
+        if self.rest[0] > self.rest[1]:
+            raise SceneError(f"{what}: rest is {list(self.rest)}; it must be the shortest and the longest length.")
         object.__setattr__(self, "coefficients", _vector(f"{what}: coefficients", self.coefficients, len(self.joints)))
         if bool(self.joints) == bool(self.bodies) or len(self.bodies) not in (0, 2):
             raise SceneError(f"{what} has joints {list(self.joints)} and bodies {list(self.bodies)}; it needs either, "

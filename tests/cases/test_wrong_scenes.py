@@ -65,6 +65,7 @@ WRONG: list[tuple[type, dict[str, Any], str]] = [
     (Pair, {"dimension": 2}, "dimension is 2; valid: "),
     (Pair, {"friction": (-0.1, *[0.0] * 4)}, "friction is .* at least 0"),
     (Loop, {"type": "glue"}, "type is 'glue'; valid: "),
+    (Tendon, {"rest": (1.0, 0.5)}, "rest is .*; it must be the shortest and the longest length"),
     (Tendon, {"bodies": ("b", "c")}, "it needs either"),
     (Tendon, {"joints": (), "coefficients": (), "bodies": ("b", "c")}, "positions is .* a point of each body"),
     (Tendon, {"coefficients": (1.0, 2.0)}, "coefficients is .*; it must be 1 numbers"),
