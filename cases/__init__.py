@@ -28,12 +28,12 @@ from crossbody.cases.errors import (
     FormatUnavailable,
     InvalidValue,
     LogFormatError,
+    Outcome,
     OutputError,
     SceneError,
     SchedulerUnavailable,
     UnknownName,
 )
-from crossbody.cases.outcome import Outcome
 from crossbody.cases.registry import Registry
 
 if TYPE_CHECKING:

@@ -1,8 +1,8 @@
-"""Limits that hold for every case: a case may widen one with its reason, none may leave one out."""
+"""Limits of every case, to be widened with a reason but not left out; and those of engines for bodies on a line."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from crossbody.cases.case import Case, Limit
 
@@ -94,3 +94,131 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
 def limits_of(case: Case) -> tuple[Limit, ...]:
     """The limits of a case in full: its own behind the defaults, so that of equals its own speak."""
     return (*default_limits(case), *case.limits)
+
+
+MEMORYLESS = (
+    "The law as a force of the state has no memory: it ends at h = 0, has no ballistic state "
+    "and makes no energy where the law does."
+)
+SPRINGS = "Springs and dampers that push below the surface, not the case's law: weight presses them in, uncancelled."
+PLANT = (
+    "A MultibodyPlant's point contact is a spring without the law's damping and cubic term, and weight presses it in."
+)
+DISCRETE = (
+    "The discrete plant regularises contact with a dissipation time of two steps: it takes energy out of every bounce."
+)
+IMPACT = "Time stepping on rigid contacts: impacts on the grid, and a restitution instead of the law."
+GAMES = "Made for games: overlap is allowed, impacts come on a grid of 1/60 s, and a restitution stands for the law."
+TOGETHER = (
+    "Every pair pushes as if it were alone: balls that touch are a chain of springs, whose "
+    "collisions overlap, not one collision after another."
+)
+
+_BALL: dict[tuple[str, str], str] = {
+    ("exudyn", "matched"): MEMORYLESS, ("exudyn", "default"): SPRINGS, ("drake", "matched"): MEMORYLESS,
+    ("drake", "continuous"): PLANT, ("drake", "default"): DISCRETE, ("dart", "matched"): IMPACT,
+    ("pymunk", "matched"): IMPACT, ("pymunk", "default"): GAMES,
+}  # fmt: skip
+_SLIDERS: dict[tuple[str, str], str] = _BALL | {
+    ("exudyn", "matched"): TOGETHER, ("exudyn", "default"): TOGETHER, ("drake", "matched"): TOGETHER,
+    ("drake", "continuous"): TOGETHER,
+}  # fmt: skip
+_LAW = (("exudyn", "matched"), ("drake", "matched"))  # the profiles to which the law's constants are given
+
+# How far each of these takes an engine at the default parameters: about twice what was measured over the variants
+# (crossbody run bouncing_ball newtons_cradle -e exudyn -e drake -e dart -e pymunk).
+_BALL_SIZES: Mapping[tuple[str, str], Mapping[str, float]] = {
+    ("exudyn", "matched"): {
+        "bounces": 2, "contacts": 2, "transitions": 4, "touch_count": 110, "position": 0.2,
+        "event_times": 0.15, "energy_drift": 0.25, "energy_per_bounce": 0.28,
+        "fifth_exit": 0.13, "lam_impulse": 0.04, "lam_impulse_path": 0.04,
+        "penetration_error": 0.2, "restitution_error": 0.7, "separation_gap": 0.04,
+    },
+    ("exudyn", "default"): {
+        "bounces": 4, "contacts": 4, "transitions": 20, "touch_count": 4, "position": 200.0,
+        "event_times": 3.0, "energy_drift": 3e5, "energy_per_bounce": 0.3, "lam_impulse": 0.7,
+        "lam_impulse_path": 0.7, "penetration_error": 20.0, "restitution_error": 4.0,
+        "separation_gap": 0.04, "final_gap": 0.2, "law_residual": 2.0,
+    },
+    ("dart", "matched"): {
+        "bounces": 2, "contacts": 2, "transitions": 8, "touch_count": 2, "position": 0.7,
+        "event_times": 0.9, "energy_drift": 3.0, "energy_per_bounce": 0.2, "fifth_exit": 0.6,
+        "lam_impulse": 0.2, "lam_impulse_path": 0.4, "penetration_error": 3.0,
+        "restitution_error": 4.0, "separation_gap": 0.04, "final_gap": 5e-8, "law_residual": 2e3,
+    },
+    ("drake", "matched"): {
+        "bounces": 2, "contacts": 2, "transitions": 4, "touch_count": 110, "position": 0.2,
+        "event_times": 0.15, "energy_drift": 0.25, "energy_per_bounce": 0.28,
+        "fifth_exit": 0.13, "lam_impulse": 0.04, "lam_impulse_path": 0.04,
+        "penetration_error": 0.2, "restitution_error": 0.7, "separation_gap": 0.04,
+    },
+    ("drake", "continuous"): {
+        "bounces": 8, "contacts": 6, "transitions": 30, "touch_count": 20, "position": 3.0,
+        "event_times": 4.0, "energy_drift": 4.0, "energy_per_bounce": 0.3, "lam_impulse": 2.0,
+        "lam_impulse_path": 2.0, "penetration_error": 20.0, "restitution_error": 2.0,
+        "separation_gap": 0.04, "final_gap": 2.0, "final_lam": 20.0, "law_residual": 2.0,
+    },
+    ("drake", "default"): {
+        "bounces": 8, "contacts": 20, "transitions": 40, "touch_count": 20, "position": 3.0,
+        "event_times": 4.0, "energy_drift": 4.0, "energy_per_bounce": 0.7, "lam_impulse": 2.0,
+        "lam_impulse_path": 2.0, "penetration_error": 20.0, "restitution_error": 4.0,
+        "separation_gap": 0.05, "final_gap": 2.0, "final_lam": 20.0, "law_residual": 2.0,
+    },
+    ("pymunk", "matched"): {
+        "bounces": 6, "contacts": 6, "transitions": 20, "touch_count": 20, "position": 0.7,
+        "event_times": 2.0, "energy_drift": 3.0, "energy_per_bounce": 0.3, "fifth_exit": 0.6,
+        "lam_impulse": 0.3, "lam_impulse_path": 0.4, "penetration_error": 3.0,
+        "restitution_error": 4.0, "separation_gap": 0.04, "law_residual": 2e3,
+    },
+    ("pymunk", "default"): {
+        "bounces": 2, "contacts": 2, "transitions": 8, "touch_count": 6, "position": 0.7,
+        "event_times": 1.0, "energy_drift": 3.0, "energy_per_bounce": 0.5, "fifth_exit": 0.5,
+        "lam_impulse": 0.3, "lam_impulse_path": 0.3, "penetration_error": 2.0,
+        "restitution_error": 4.0, "separation_gap": 0.05, "final_gap": 0.02, "law_residual": 60.0,
+    },
+}  # fmt: skip
+_SLIDER_SIZES: Mapping[tuple[str, str], Mapping[str, float]] = {
+    ("exudyn", "matched"): {"energy_drift": 1.2, "event_times": 0.02, "pattern_distance": 0.6, "position": 0.6},
+    ("exudyn", "default"): {"energy_drift": 1.2, "event_times": 0.02, "pattern_distance": 0.6, "position": 0.6},
+    ("dart", "matched"): {
+        "balls_out": 2, "energy_drift": 3e-4, "event_times": 8e-3, "pattern_distance": 2.0, "position": 2.0,
+    },
+    ("drake", "matched"): {"energy_drift": 1.2, "event_times": 0.02, "pattern_distance": 0.6, "position": 0.6},
+    ("drake", "continuous"): {"energy_drift": 1.2, "event_times": 8e-3, "pattern_distance": 0.6, "position": 0.6},
+    ("drake", "default"): {
+        "balls_out": 2, "energy_drift": 2.0, "event_times": 0.02, "pattern_distance": 2.0, "position": 2.0,
+    },
+    ("pymunk", "matched"): {
+        "balls_out": 2, "event_times": 8e-3, "pattern_distance": 2.0, "position": 2.0, "touch_count": 4,
+    },
+    ("pymunk", "default"): {
+        "balls_out": 2, "energy_drift": 0.9, "event_times": 0.2, "pattern_distance": 2.0, "position": 2.0,
+        "touch_count": 2,
+    },
+}  # fmt: skip
+
+
+def ball(wanted: Mapping[str, tuple[float, str]], bilateral: bool) -> Iterator[Limit]:
+    """The limits of a ball: `wanted` is metric -> value and its reason."""
+    for (engine, profile), known in _BALL.items():
+        if not (bilateral and known == MEMORYLESS):
+            yield from _limits(engine, profile, known, wanted, _BALL_SIZES.get((engine, profile), {}))
+
+
+def sliders(wanted: Mapping[str, tuple[float, str]]) -> Iterator[Limit]:
+    """The limits of a cradle's sliders."""
+    for (engine, profile), known in _SLIDERS.items():
+        yield from _limits(engine, profile, known, wanted, _SLIDER_SIZES.get((engine, profile), {}))
+
+
+def _limits(
+    engine: str, profile: str, known: str, wanted: Mapping[str, tuple[float, str]], sizes: Mapping[str, float]
+) -> Iterator[Limit]:  # fmt: skip
+    for metric, (value, why) in wanted.items():
+        yield Limit(
+            metric=metric, value=value, engine=engine, profile=profile, why=why, known=known,
+            known_size=sizes.get(metric, 0.0), covers_none=True,
+        )  # fmt: skip
+    yield Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
+    if (engine, profile) not in _LAW:
+        yield Limit(metric="audit", engine=engine, profile=profile, known=known)

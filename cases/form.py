@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case
 from crossbody.cases.files.case import RATES, coordinates, quaternions
 from crossbody.cases.scene import Scene
-from crossbody.cases.scene_rows import law_of, rows_of
+from crossbody.cases.scene_contacts import law_of, rows_of
 
 Map = Callable[[Floats, Floats], tuple[Floats, Floats]]
 """(q (m, nq), v (m, nv)) -> the same states in other coordinates; linear in v."""

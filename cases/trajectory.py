@@ -14,7 +14,7 @@ import numpy as np
 from crossbody.cases.arguments import instance
 from crossbody.cases.arrays import Bytes, Floats, frozen
 from crossbody.cases.entry_points import checked_arguments
-from crossbody.cases.outcome import Outcome
+from crossbody.cases.errors import Outcome
 
 if TYPE_CHECKING:
     from crossbody.cases.case import Inputs

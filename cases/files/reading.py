@@ -1,18 +1,24 @@
-"""Which reader a file needs: by its suffix, or by its root where that says nothing."""
+"""Which reader a file needs, by its suffix or its root; and what its text says that the compiler would pass over.
+
+A file may come from anywhere: it includes nothing from outside its folder, and it has no more
+bodies than a scene.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree
 
-from crossbody.cases.errors import InvalidValue, NoFile
+from crossbody.cases.errors import InvalidValue, NoFile, SceneError
 from crossbody.cases.files import mjcf, urdf
 from crossbody.cases.files.without import strip
 from crossbody.cases.regular import open_regular
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import LARGEST, Scene
 
 if TYPE_CHECKING:
     import mujoco
+
 
 SUFFIXES = (".xml", ".urdf")
 HEAD = 4096
@@ -71,3 +77,51 @@ def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
 def findings_of(path: Path) -> list[str]:
     """Return sentences on what is strange in a file to us, not to its compiler, but is taken as it stands."""
     return urdf.findings(path) if is_urdf(path) else []
+
+
+BYTES = 50_000_000  # of a file
+BODIES = ("body", "link")
+
+
+def check_text(path: Path) -> None:
+    """Check a file and what it includes; what is no XML is left to the compiler, which names the line.
+
+    Raises:
+        SceneError: for more bodies than a scene may have, for an include from outside the folder,
+            for too many bytes.
+    """
+    _count(path, path.resolve().parent, {path.resolve()})
+
+
+def _count(path: Path, folder: Path, seen: set[Path]) -> int:
+    """Return how many bodies a file has with its includes."""
+    total, copies = 0, [1]
+    if path.stat().st_size > BYTES:
+        raise SceneError(f"{path} has {path.stat().st_size} bytes; valid: at most {BYTES}.")
+    with open_regular(path) as file:
+        try:
+            for event, part in ElementTree.iterparse(file, ("start", "end")):
+                if part.tag == "replicate":
+                    count = part.get("count", "1")
+                    times = int(count) if count.isdecimal() else 1
+                    copies = copies[:-1] if event == "end" else [*copies, copies[-1] * times]
+                elif event == "start" and part.tag in BODIES:
+                    total += copies[-1]
+                elif event == "start" and part.tag == "include":
+                    total += copies[-1] * _included(part.get("file", ""), path, folder, seen)
+                if total > LARGEST:
+                    raise SceneError(f"{path} has more than {LARGEST} bodies, the most that a scene may have.")
+                part.clear() if event == "end" else None
+        except ElementTree.ParseError:
+            return total
+    return total
+
+
+def _included(name: str, path: Path, folder: Path, seen: set[Path]) -> int:
+    there = (folder / name).resolve()
+    if not there.is_relative_to(folder):
+        raise SceneError(f"{path} includes {name!r} from outside its folder {folder}; valid: files in there.")
+    if there in seen or not there.is_file():
+        return 0
+    seen.add(there)
+    return _count(there, folder, seen)

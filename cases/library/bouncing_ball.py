@@ -14,7 +14,7 @@ from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
 from crossbody.cases.mechanisms.ball.limits import limits
 from crossbody.cases.mechanisms.ball.truth import Ball, Motion
 from crossbody.cases.scene import UNBOUNDED, Body, Joint, Loop, RowLaw, Scene, Shape
-from crossbody.cases.scene_rows import law_of
+from crossbody.cases.scene_contacts import law_of
 
 PARAMETERS = {
     "mass": Parameter(default=1.0, unit="kg", doc="mass of the ball", low=0.0, open_low=True),

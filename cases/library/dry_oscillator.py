@@ -1,18 +1,100 @@
 """A mass on a spring whose guide has dry friction: each half swing is shorter by the same; it stops off the middle.
 
-How far off depends on where it began; within reach of the spring's rest friction holds it for good.
+With w^2 = k/m and reach = f/k it swings about reach on either side, each half swing shorter by
+twice that, and stays where it stops within reach of the spring's rest. Without a spring it slides
+on a parabola, and stays where it stops.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 
+import numpy as np
+
+from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction.creep import Soft
 from crossbody.cases.mechanisms.friction.limits import limits
-from crossbody.cases.mechanisms.friction.oscillator import creep, oscillator
+from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
+from crossbody.cases.trajectory import Mode
+
+MOST_SWINGS = 1e4  # half swings that are told one by one at most
+
+Path = Callable[[Floats], tuple[Floats, Floats]]
+"""Times since a start (n,), s -> place and velocity (n,), m and m/s."""
+
+
+def _slide(x: float, v: float, way: float, p: Mapping[str, float]) -> tuple[Path, float]:
+    """Return the path of a mass that slides along `way` from x at velocity v, and when it stops, s."""
+    m, k, push = p["mass"], p["stiffness"], -way * p["friction_loss"]
+    if k == 0.0:
+        a = push / m
+        return lambda s: (x + s * (v + 0.5 * a * s), v + a * s), -v / a
+    w, middle = math.sqrt(k / m), push / k
+    a, b = x - middle, v / w
+    half = math.atan2(b, a) % math.pi if v != 0.0 else math.pi
+
+    def path(s: Floats) -> tuple[Floats, Floats]:
+        sine, cosine = np.sin(w * s), np.cos(w * s)
+        return middle + a * cosine + b * sine, w * (b * cosine - a * sine)
+
+    return path, half / w
+
+
+def _half_swings(p: Mapping[str, float]) -> float:
+    """Return how often the mass turns at most until it stops, or the horizon: each costs it twice the loss over k."""
+    w = math.sqrt(p["stiffness"] / p["mass"])
+    reach = p["stiffness"] * abs(p["start"]) + w * p["mass"] * abs(p["speed"])
+    return min(p["t_end"] * w / math.pi, 0.5 * reach / p["friction_loss"])
+
+
+def oscillator(p: Mapping[str, float]) -> Motion | None:
+    """Return the motion from place `start` at velocity `speed`: q = (x,), one row, that of friction.
+
+    None where it has too many swings.
+    """
+    if not _half_swings(p) < MOST_SWINGS:
+        return None
+    x, v, t, loss, stages = p["start"], p["speed"], 0.0, p["friction_loss"], list[Stage]()
+    first = Mode.STICK if v == 0.0 else Mode.SLIP
+
+    def stage(path: Path, begins: float, mode: Mode, force: float) -> Stage:
+        def at(s: Floats) -> Rows:
+            place, rate = path(s)
+            return place[:, None], rate[:, None], np.zeros((len(s), 1)), np.full((len(s), 1), force)
+
+        return Stage(begins, (int(mode),), at)
+
+    while t <= p["t_end"] and (v != 0.0 or abs(p["stiffness"] * x) > loss):
+        way = math.copysign(1.0, v if v != 0.0 else -x)
+        path, lasts = _slide(x, v, way, p)
+        stages.append(stage(path, t, Mode.SLIP, -way * loss))
+        x, v, t = float(path(np.array([lasts]))[0][0]), 0.0, t + lasts
+    if t <= p["t_end"]:
+        rest = np.array([x])
+        held = lambda s: (np.broadcast_to(rest, s.shape), np.zeros(len(s)))  # noqa: E731
+        stages.append(stage(held, t, Mode.STICK, p["stiffness"] * x))
+
+    def energy(q: Floats, v: Floats) -> Floats:
+        return np.stack([0.5 * p["mass"] * v[:, 0] ** 2, 0.5 * p["stiffness"] * q[:, 0] ** 2], axis=1)
+
+    return Motion(stages, 1, energy, p["t_end"], before=first)
+
+
+def creep(p: Mapping[str, float], soft: Soft) -> float:
+    """Return how fast a mass that friction holds creeps at the horizon, m/s.
+
+    MuJoCo's row is a damper b v whose force a softness R = (1 - d)/d of the inverse mass limits,
+    d that of no depth: (1 + R) x'' + b x' + R k/m x = 0.
+    """
+    d = soft.impedance(0.0)
+    softness, rate = (1.0 - d) / d, p["stiffness"] / p["mass"]
+    slow, fast = sorted(np.roots([1.0 + softness, soft.damping, softness * rate]).real, key=abs)
+    return float(abs(p["start"] * slow * fast / (fast - slow) * math.exp(slow * p["t_end"])))
+
 
 PARAMETERS = {
     "mass": Parameter(default=2.0, unit="kg", doc="of the body", low=0.0, open_low=True),

@@ -18,7 +18,7 @@ from crossbody.cases.mechanisms.cradle.metrics import METRICS, SLIDING
 from crossbody.cases.mechanisms.cradle.motion import Motion
 from crossbody.cases.mechanisms.cradle.scene import FROZEN, Row, law, row, scene
 from crossbody.cases.parameters import NumberOrWord, Numbers
-from crossbody.cases.scene_rows import law_of
+from crossbody.cases.scene_contacts import law_of
 
 AUTO = "auto"
 

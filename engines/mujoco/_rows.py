@@ -12,8 +12,7 @@ from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.scene import WIDTHS, Scene
-from crossbody.cases.scene_contacts import WAYS, Contact
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import WAYS, Contact, rows_of
 from crossbody.engines._contacts import TOGETHER, Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces

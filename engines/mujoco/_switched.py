@@ -17,7 +17,7 @@ import numpy as np
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import rows_of
 from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import elastic_part

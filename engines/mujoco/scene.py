@@ -19,8 +19,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
-from crossbody.cases.scene_contacts import frictional, rough
-from crossbody.cases.scene_rows import rows_of, under_law
+from crossbody.cases.scene_contacts import frictional, rough, rows_of, under_law
 from crossbody.engines._acting import Acting
 from crossbody.engines._force import acting as acting_of
 from crossbody.engines._gates import ALL_AT_ONCE

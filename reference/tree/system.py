@@ -10,8 +10,7 @@ import numpy as np
 from crossbody.cases import Law
 from crossbody.cases.control import Control
 from crossbody.cases.scene import Scene
-from crossbody.cases.scene_contacts import WAYS, contacts
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import WAYS, contacts, rows_of
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._redundant import ranked

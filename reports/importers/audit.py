@@ -17,8 +17,7 @@ from crossbody.cases import SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.inertias import Inertia, of_shapes, six
-from crossbody.cases.files.reading import findings_of, is_urdf, read, scene_of
-from crossbody.cases.files.text import check_text
+from crossbody.cases.files.reading import check_text, findings_of, is_urdf, read, scene_of
 from crossbody.cases.files.urdf import bounds, parsed, planar
 from crossbody.cases.files.without import without_meshes
 from crossbody.cases.scene import Body, Scene

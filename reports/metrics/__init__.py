@@ -9,7 +9,7 @@ A metric is a module with a docstring whose first line says what it measures, an
 
 and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name; if it can say of
 what the number is, `where(truth, run, case)`, in a few words. What the runs of
-one mechanism alone show is data of its cases (`crossbody.cases.metric`). Metrics of a kind stand together as functions
+one mechanism alone show is data of its cases (`crossbody.cases.case`). Metrics of a kind stand together as functions
 of one module, named by its UNITS and NEEDS; those of a run alone, (run, case), in `_of_run` and `_of_friction`.
 """
 
@@ -83,7 +83,7 @@ def load(name: str) -> Metric:
 
 @cache
 def _among_others(name: str) -> Metric:
-    from crossbody.cases.metric import CaseMetric  # numpy, without which names are listed
+    from crossbody.cases.case import CaseMetric  # numpy, without which names are listed
     from crossbody.reports.metrics._of_case import OfCase, OfModule
 
     module, doc = _together()[name]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crossbody.cases import Case, Trajectory
-from crossbody.cases.metric import CaseMetric
+from crossbody.cases.case import CaseMetric
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import Truth
 

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from crossbody.cases import Mode, load
 from crossbody.cases import closed_forms as cf
-from crossbody.cases.linear_arc import LinearArc
+from crossbody.cases.closed_forms import LinearArc
 from crossbody.cases.mechanisms.ball import truth as _ball_truth
 from crossbody.cases.mechanisms.ball.truth import Ball, Motion
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, Event, InvalidValue, Mode, Tier, Trajectory, load
+from crossbody.cases.case import CaseMetric
 from crossbody.cases.mechanisms.cradle.metrics import row
 from crossbody.cases.mechanisms.cradle.rules import answer
-from crossbody.cases.metric import CaseMetric
 from crossbody.reports import metrics
 from crossbody.reports.measuring.truth import from_run
 

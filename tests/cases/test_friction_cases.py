@@ -13,7 +13,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, InvalidValue, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.mechanisms.friction.rocking import flat_at
+from crossbody.cases.library.rocking_block import flat_at
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word, judge

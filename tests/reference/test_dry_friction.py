@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 from crossbody import cases, engines
 from crossbody.cases import Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.mechanisms.friction.oscillator import oscillator
+from crossbody.cases.library.dry_oscillator import oscillator
 from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.reference import System, ensemble, simulate
 from crossbody.reference.tree.system import system

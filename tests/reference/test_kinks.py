@@ -11,7 +11,7 @@ from random_scenes import random_scene, random_state
 
 from crossbody.cases import Control, Law, Outcome
 from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape, Tendon
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import rows_of
 from crossbody.reference import System, simulate
 from crossbody.reference.linear import linearise, sensitivity
 from crossbody.reference.tree.system import system

@@ -9,7 +9,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import Case, Mode
-from crossbody.cases.scene_rows import law_of
+from crossbody.cases.scene_contacts import law_of
 from crossbody.engines.equations import builder
 from crossbody.reference import System, simulate
 from crossbody.reference.tree.system import system

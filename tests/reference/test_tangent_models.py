@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases import Law, Outcome, SceneError
 from crossbody.cases.scene import Body, Joint, Loop, Pair, RowLaw, Scene, Shape
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import rows_of
 from crossbody.engines.linear import Spot
 from crossbody.reference import System, kernels, simulate
 from crossbody.reference.linear import linearise, sensitivity, tangents, trim

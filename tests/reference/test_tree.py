@@ -17,7 +17,7 @@ from crossbody.cases import CaseUnsupported, Mode, SceneError
 from crossbody.cases.files.case import case_of
 from crossbody.cases.files.mjcf import scene_of
 from crossbody.cases.scene import Actuator, Body, Joint, Scene, Tendon
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import rows_of
 from crossbody.engines import load
 from crossbody.engines._scene import Forces, Rows
 from crossbody.engines.equations import system_of

@@ -10,7 +10,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, InvalidValue, Outcome, SceneError, Tier, Trajectory, load
 from crossbody.cases.mechanisms.delta import pose
-from crossbody.cases.scene_rows import under_law
+from crossbody.cases.scene_contacts import under_law
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.kinematics import tips

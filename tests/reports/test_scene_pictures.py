@@ -15,9 +15,8 @@ from scipy.spatial.transform import Rotation
 from crossbody.cases.files.case import case_of, quaternions
 from crossbody.cases.rotations import rates
 from crossbody.cases.scene import Body, Scene, Shape
-from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_contacts import contacts, rows_of
 from crossbody.cases.scene_plain import plain, scene_from
-from crossbody.cases.scene_rows import rows_of
 from crossbody.engines import load
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate

@@ -16,8 +16,7 @@ import numpy as np
 from scenes import rows_at
 
 from crossbody.cases.scene import Loop, Scene
-from crossbody.cases.scene_contacts import contacts
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import contacts, rows_of
 from crossbody.engines._scene import Forces
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio.scene import Gaps, spans, tree

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape
-from crossbody.cases.scene_rows import rows_of
+from crossbody.cases.scene_contacts import rows_of
 from crossbody.engines.mujoco import _build as build
 from crossbody.reference.tree import mechanism, quantities
 from crossbody.reference.tree.table import tabulate

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from crossbody.cases import peer_limits
+from crossbody.cases import defaults
 from crossbody.cases.case import Claim, Limit
 
 _TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from impact to impact"
@@ -82,7 +82,7 @@ def _all(wanted: dict[str, tuple[float, str]], bilateral: bool, height: float) -
         yield Limit(metric=metric, value=value, why=why)
     for engine, profile, known in _KNOWN:
         yield Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
-    yield from peer_limits.ball(wanted, bilateral)
+    yield from defaults.ball(wanted, bilateral)
     if bilateral:
         yield Limit(metric="energy_drift", value=2e-5, why=_SMALL)
         yield Limit(metric="energy_integrator", value=2e-5, why=_SMALL)

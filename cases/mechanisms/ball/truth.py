@@ -16,9 +16,9 @@ from itertools import islice, pairwise
 import numpy as np
 
 from crossbody.cases.arrays import Bytes, Floats
-from crossbody.cases.linear_arc import LinearArc
-from crossbody.cases.outcome import Outcome
-from crossbody.cases.pieces import pieces
+from crossbody.cases.between import pieces
+from crossbody.cases.closed_forms import LinearArc
+from crossbody.cases.errors import Outcome
 from crossbody.cases.trajectory import Event, Ledger, Mode, Trajectory
 
 MAX_ARCS = 20_000

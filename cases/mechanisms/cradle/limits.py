@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from crossbody.cases import peer_limits
+from crossbody.cases import defaults
 from crossbody.cases.case import Claim, Limit
 
 TOGETHER = (
@@ -120,7 +120,7 @@ def _all(mechanism: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
             yield Limit(metric=metric, value=1e-5, engine="mujoco", profile="matched", why=_FIXED)
     if mechanism == "sliders":
         yield Limit(metric="momentum", value=1e-10, why=_KEPT)
-        yield from peer_limits.sliders(bounds)
+        yield from defaults.sliders(bounds)
         for (engine, profile), (value, why) in _STEP.items():
             yield Limit(metric="largest position (step)", value=value, engine=engine, profile=profile, why=why)
         yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Case
+from crossbody.cases.case import Case, CaseMetric
 from crossbody.cases.contacts import CLOSED, contacts
 from crossbody.cases.mechanisms.cradle import scene
 from crossbody.cases.mechanisms.cradle.rules import answer
-from crossbody.cases.metric import CaseMetric
 from crossbody.cases.trajectory import Trajectory
 
 SLOW = 1e-6  # a gap that closes slower than this part of the speed that came in stands still

@@ -10,10 +10,10 @@ from itertools import pairwise
 import numpy as np
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.between import pieces
+from crossbody.cases.errors import Outcome
 from crossbody.cases.mechanisms.cradle.impact import RULES, STILL, TIE, Touching
 from crossbody.cases.mechanisms.cradle.scene import Row
-from crossbody.cases.outcome import Outcome
-from crossbody.cases.pieces import pieces
 from crossbody.cases.trajectory import Event, Ledger, Mode, Trajectory
 
 MAX_IMPACTS = 100_000

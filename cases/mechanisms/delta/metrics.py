@@ -7,11 +7,10 @@ import math
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Case
+from crossbody.cases.between import period
+from crossbody.cases.case import Case, CaseMetric
 from crossbody.cases.mechanisms.delta import pose
-from crossbody.cases.metric import CaseMetric
 from crossbody.cases.parameters import of_numbers
-from crossbody.cases.pieces import period
 from crossbody.cases.trajectory import Trajectory
 
 

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.pieces import pieces
+from crossbody.cases.between import pieces
 from crossbody.cases.trajectory import Event, Mode, Trajectory
 
 HALVINGS, LEAST = 100, 1e-300  # of ln u between its least value and its start

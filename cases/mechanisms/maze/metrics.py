@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Case
+from crossbody.cases.between import period
+from crossbody.cases.case import Case, CaseMetric
 from crossbody.cases.contacts import at, contacts
-from crossbody.cases.metric import CaseMetric
-from crossbody.cases.pieces import period
 from crossbody.cases.trajectory import Trajectory
 
 FACE_BELOW = 0

@@ -17,7 +17,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from crossbody.cases import closed_forms as cf
-from crossbody.cases.linear_arc import LinearArc
+from crossbody.cases.closed_forms import LinearArc
 from crossbody.cases.trajectory import Event, Mode
 
 SPENT = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT

@@ -8,10 +8,9 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import multipliers
-from crossbody.cases.case import Case
+from crossbody.cases.case import Case, CaseMetric
 from crossbody.cases.contacts import contacts
 from crossbody.cases.mechanisms.delta import pose
-from crossbody.cases.metric import CaseMetric
 from crossbody.cases.parameters import of_numbers
 from crossbody.cases.trajectory import Trajectory
 
