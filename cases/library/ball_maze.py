@@ -22,9 +22,8 @@ import numpy as np
 
 from crossbody.cases.case import Case, Coordinate, Law, Parameter, Value
 from crossbody.cases.mechanisms.maze import geometry
-from crossbody.cases.mechanisms.maze.claims import claims, fallen, limits
+from crossbody.cases.mechanisms.maze.claims import METRICS, claims, fallen, limits
 from crossbody.cases.mechanisms.maze.form import in_plane
-from crossbody.cases.mechanisms.maze.metrics import METRICS
 
 
 def _positive(default: float, unit: str, doc: str) -> Parameter:

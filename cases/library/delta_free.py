@@ -12,7 +12,7 @@ import numpy as np
 from crossbody.cases.case import Case, Chaos, Value
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta import scene as delta
-from crossbody.cases.mechanisms.delta.limits import FREE
+from crossbody.cases.mechanisms.delta.claims import FREE
 from crossbody.cases.parameters import of_numbers
 
 PARAMETERS = {**delta.ROBOT, **delta.position(0.05, 0.02, 0.5), **delta.horizon(2.5)}

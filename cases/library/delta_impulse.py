@@ -14,7 +14,7 @@ from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.errors import InvalidValue
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta import scene as delta
-from crossbody.cases.mechanisms.delta.limits import IMPULSE
+from crossbody.cases.mechanisms.delta.claims import IMPULSE
 from crossbody.cases.parameters import of_numbers
 
 PARAMETERS = {

@@ -14,7 +14,7 @@ import numpy as np
 from crossbody.cases.case import Case, Claim, Parameter, Tier, Value
 from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta import scene as delta
-from crossbody.cases.mechanisms.delta.limits import on_the_circle, tracking
+from crossbody.cases.mechanisms.delta.claims import on_the_circle, tracking
 from crossbody.cases.parameters import of_numbers
 
 PARAMETERS = {

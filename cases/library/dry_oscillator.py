@@ -15,8 +15,7 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.files.case import case_of
-from crossbody.cases.mechanisms.friction.creep import Soft
-from crossbody.cases.mechanisms.friction.limits import limits
+from crossbody.cases.mechanisms.friction.limits import Soft, limits
 from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.cases.trajectory import Mode

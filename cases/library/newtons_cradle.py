@@ -13,8 +13,7 @@ import numpy as np
 
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
-from crossbody.cases.mechanisms.cradle.limits import limits
-from crossbody.cases.mechanisms.cradle.metrics import METRICS, SLIDING
+from crossbody.cases.mechanisms.cradle.claims import METRICS, SLIDING, limits
 from crossbody.cases.mechanisms.cradle.motion import Motion
 from crossbody.cases.mechanisms.cradle.scene import FROZEN, Row, law, row, scene
 from crossbody.cases.parameters import NumberOrWord, Numbers

@@ -17,7 +17,7 @@ from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
 from crossbody.cases.errors import SceneError
-from crossbody.cases.mechanisms.red_body.limits import METRICS, limits
+from crossbody.cases.mechanisms.red_body.claims import METRICS, limits
 from crossbody.cases.mechanisms.red_body.order import STAGES, Fall, inequalities
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import law_of

@@ -15,8 +15,7 @@ import numpy as np
 from crossbody.cases.case import Case, Limit, Parameter, Value
 from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction import blocks
-from crossbody.cases.mechanisms.friction.creep import Soft, creep, mixed, regularised
-from crossbody.cases.mechanisms.friction.limits import limits
+from crossbody.cases.mechanisms.friction.limits import Soft, creep, limits, mixed, regularised
 from crossbody.cases.mechanisms.friction.scene import NUMBERS, block_on_floor, field, point_on_floor
 
 PARAMETERS = {

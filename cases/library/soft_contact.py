@@ -13,28 +13,27 @@ import numpy as np
 
 from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.errors import InvalidValue
-from crossbody.cases.mechanisms.soft import robot
+from crossbody.cases.mechanisms.soft import robot_form
 from crossbody.cases.mechanisms.soft import scene as soft
-from crossbody.cases.mechanisms.soft.claims import claims, limits
+from crossbody.cases.mechanisms.soft.claims import METRICS, claims, limits
 from crossbody.cases.mechanisms.soft.form import on_axis
-from crossbody.cases.mechanisms.soft.metrics import METRICS
 from crossbody.cases.mechanisms.soft.robot_form import on_robot
 
 PARAMETERS = {
     **soft.FINGERS,
     **soft.AXIS,
-    **robot.ROBOT,
+    **robot_form.ROBOT,
     "t_end": Parameter(default=5.0, unit="s", doc="horizon", low=0.0, open_low=True),
 }
 
 VARIANTS: dict[str, dict[str, Value]] = {"axis": {}, "delta": {"release": 4.2, "t_end": 6.5}}
 
-_FOREIGN = {"axis": robot.ROBOT, "delta": soft.AXIS}
+_FOREIGN = {"axis": robot_form.ROBOT, "delta": soft.AXIS}
 _TITLES = {
     "axis": "soft fingers close on a block that is off their middle",
     "delta": "a delta robot comes down, grasps a block softly, lets it go and rises",
 }
-_COORDINATES = {"axis": soft.COORDINATES, "delta": robot.COORDINATES}
+_COORDINATES = {"axis": soft.COORDINATES, "delta": robot_form.COORDINATES}
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
@@ -43,8 +42,8 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     soft.check(p)
     _check_names(variant, parameters)
     if whole := variant == "delta":
-        robot.check(p)
-    q0 = robot.start(p) if whole else soft.start(p)
+        robot_form.check(p)
+    q0 = robot_form.start(p) if whole else soft.start(p)
     claimed = claims(variant, parameters, PARAMETERS, VARIANTS[variant])
     return Case(
         name="soft_contact",
@@ -53,7 +52,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         mechanism="soft_delta" if whole else "soft_contact",
         parameters=parameters,
         coordinates=tuple(soft.coordinate(p, name, unit) for name, unit in _COORDINATES[variant]),
-        contacts=robot.CONTACTS if whole else ("left", "right"),
+        contacts=robot_form.CONTACTS if whole else ("left", "right"),
         q0=q0,
         v0=np.zeros(len(q0)),
         t_end=p["t_end"],

@@ -13,9 +13,9 @@ import numpy as np
 
 from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.files.case import case_of
+from crossbody.cases.library.rolling_sphere import turned
 from crossbody.cases.mechanisms.friction.limits import limits
 from crossbody.cases.mechanisms.friction.scene import NUMBERS, tossed_cube
-from crossbody.cases.mechanisms.friction.spheres import turned
 
 PARAMETERS = {
     **NUMBERS,

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.mechanisms.maze.closed_forms import INERTIA
+from crossbody.cases.mechanisms.maze.claims import INERTIA
 from crossbody.reference import kernels
 from crossbody.reference.kinds import Floats
 from crossbody.reference.systems._maze_layout import (

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crossbody.cases.mechanisms.maze import closed_forms as cf
+from crossbody.cases.mechanisms.maze import claims as cf
 from crossbody.cases.mechanisms.maze import geometry
 from crossbody.reference import System, kernels
 from crossbody.reference.kinds import Array, Floats, Index

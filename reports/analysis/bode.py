@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, Value
-from crossbody.cases.mechanisms.soft import closed_forms as closed
+from crossbody.cases.mechanisms.soft import claims as closed
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.reference.linear import LinearModel, linearise
 

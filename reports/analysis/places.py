@@ -177,7 +177,7 @@ def _solid(case: Case, ring: int) -> float:
 
 def _soft(case: Case, at: Mapping[str, float]) -> list[Place]:
     """Closed fingers in every mode set; positions, sensors and multipliers are found."""
-    from crossbody.cases.mechanisms.soft import closed_forms as closed
+    from crossbody.cases.mechanisms.soft import claims as closed
     from crossbody.cases.mechanisms.soft.scene import numbers
 
     p, found = numbers(case.parameters), []

@@ -17,7 +17,7 @@ import pandas as pd
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory
 from crossbody.cases.contacts import CLOSED
-from crossbody.cases.mechanisms.cradle.metrics import distance, row
+from crossbody.cases.mechanisms.cradle.claims import distance, row
 from crossbody.cases.mechanisms.cradle.rules import RULES
 from crossbody.reports.measuring.switching import made
 from crossbody.reports.runs.choice import Pick

@@ -17,7 +17,7 @@ import pandas as pd
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Trajectory, Value
-from crossbody.cases.mechanisms.maze.metrics import ring_changes
+from crossbody.cases.mechanisms.maze.claims import ring_changes
 from crossbody.reports.runs.choice import Pick
 
 COLUMNS = (

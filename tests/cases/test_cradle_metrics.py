@@ -10,7 +10,7 @@ import pytest
 
 from crossbody.cases import Case, Event, InvalidValue, Mode, Tier, Trajectory, load
 from crossbody.cases.case import CaseMetric
-from crossbody.cases.mechanisms.cradle.metrics import row
+from crossbody.cases.mechanisms.cradle.claims import row
 from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.reports import metrics
 from crossbody.reports.measuring.truth import from_run

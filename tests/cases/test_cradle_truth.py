@@ -9,8 +9,7 @@ import pytest
 
 from crossbody import engines
 from crossbody.cases import Case, Outcome, Tier, Value, load
-from crossbody.cases.mechanisms.cradle.impact import delassus, pushes
-from crossbody.cases.mechanisms.cradle.motion import Motion
+from crossbody.cases.mechanisms.cradle.motion import Motion, delassus, pushes
 from crossbody.cases.mechanisms.cradle.rules import RULES, answer, block, simultaneous
 from crossbody.cases.mechanisms.cradle.scene import Row
 from crossbody.reports import metrics

@@ -10,7 +10,7 @@ import pytest
 
 from crossbody import engines
 from crossbody.cases import Inputs, Law, load
-from crossbody.cases.mechanisms.delta import chart
+from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta.scene import NAMES, ROBOT
 from crossbody.reference import delta
 from crossbody.reference.delta.kernels import robot as kernels
@@ -100,8 +100,8 @@ def off(a, b):
 
 def test_chart_there_and_back():
     q, v, _ = states()
-    r, rd = chart.to_tree(q, v)
-    q2, v2 = chart.from_tree(r, rd)
+    r, rd = pose.to_tree(q, v)
+    q2, v2 = pose.from_tree(r, rd)
     np.testing.assert_allclose(q2, q, atol=1e-12)
     np.testing.assert_allclose(v2, v, rtol=1e-10, atol=1e-10)
 
@@ -110,11 +110,11 @@ def test_rates_of_the_chart_are_derivatives():
     """r' by differences of r along q + t v, and v' by differences of v along the tree's steady motion."""
     q, v, _ = (x[:200] for x in states())
     h = 1e-6
-    r, rd = chart.to_tree(q, v)
-    slope = (chart.to_tree(q + h * v, v)[0] - chart.to_tree(q - h * v, v)[0]) / (2 * h)
+    r, rd = pose.to_tree(q, v)
+    slope = (pose.to_tree(q + h * v, v)[0] - pose.to_tree(q - h * v, v)[0]) / (2 * h)
     np.testing.assert_allclose(rd, slope, rtol=1e-5, atol=1e-5 * np.abs(rd).max())
-    ahead, behind = (chart.from_tree(r + s * h * rd, rd)[1] for s in (1, -1))
-    exact = chart.bend(r, rd)
+    ahead, behind = (pose.from_tree(r + s * h * rd, rd)[1] for s in (1, -1))
+    exact = pose.bend(r, rd)
     np.testing.assert_allclose(exact, (ahead - behind) / (2 * h), rtol=1e-5, atol=1e-5 * np.abs(exact).max())
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crossbody import cases
-from crossbody.cases.mechanisms.delta import chart, pose, torque
+from crossbody.cases.mechanisms.delta import controller, pose
 from crossbody.cases.mechanisms.delta.controller import Controller
 from crossbody.cases.parameters import of_numbers
 from crossbody.reference.delta import control, scene
@@ -40,7 +40,7 @@ class Own:
         })  # fmt: skip
 
     def tick(self, t, q):
-        return self.controller(t, *chart.to_tree(np.array(q), np.zeros(9)))
+        return self.controller(t, *pose.to_tree(np.array(q), np.zeros(9)))
 
 
 MAKERS = {"compiled": Compiled, "own": Own}
@@ -138,14 +138,14 @@ def test_torques_and_gaps_of_the_scene_are_those_of_the_reference(seed, sign):
     rng = np.random.default_rng(seed)
     case = cases.load("soft_contact", "delta", sign=sign)
     robot = scene.robot_of(case.parameters)
-    p, own = robot.array(), torque.numbers(of_numbers(case.parameters))
+    p, own = robot.array(), controller.numbers(of_numbers(case.parameters))
     for q, v in zip(case.q0[:9] + 0.3 * rng.standard_normal((20, 9)), rng.standard_normal((20, 9)), strict=True):
         y, x, asked = np.ascontiguousarray(q[::3]), q.reshape(3, 3)[:, 1:].ravel(), rng.standard_normal(3)
         z, hold, found = np.empty((3, 3))
         Jy, My, X = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 3))
         kinematics.jacobians(p, y, x, z, Jy, X, hold)
         kinematics.task_mass(p, y, x, True, My)
-        torque.motor_torque(y, x, asked, own, found)
+        controller.motor_torque(y, x, asked, own, found)
         np.testing.assert_allclose(found, My @ np.linalg.solve(Jy, asked) + hold, rtol=1e-11)
         gap, rate = np.empty(6), np.empty(6)
         kernels.gaps(0.0, q, v, p, gap, rate)
@@ -156,5 +156,5 @@ def test_torques_and_gaps_of_the_scene_are_those_of_the_reference(seed, sign):
 def test_a_pose_without_a_direction_has_no_torque():
     parameters = of_numbers(cases.load("soft_contact", "delta").parameters)
     found = np.zeros(3)
-    torque.motor_torque(np.zeros(3), np.zeros(6), np.ones(3), torque.numbers(parameters), found)
+    controller.motor_torque(np.zeros(3), np.zeros(6), np.ones(3), controller.numbers(parameters), found)
     assert np.isnan(found).all()

@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.mechanisms.friction.creep import STEP, mixed, regularised
-from crossbody.cases.mechanisms.friction.limits import NEAR
+from crossbody.cases.mechanisms.friction.limits import NEAR, STEP, mixed, regularised
 from crossbody.cases.scene import Body, Joint, Loop, Pair, Scene, Shape
 from crossbody.engines._rubbing import Push, Rubbing
 from crossbody.engines.equations import system_of

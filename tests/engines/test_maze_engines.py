@@ -9,11 +9,11 @@ import pytest
 
 from crossbody.cases import CaseUnsupported, Mode, Outcome, load
 from crossbody.cases.gates import CHANGED, START
-from crossbody.cases.mechanisms.maze import closed_forms as cf
+from crossbody.cases.mechanisms.maze import claims as cf
 from crossbody.cases.mechanisms.maze import form as maze
 from crossbody.cases.mechanisms.maze.gates import EDGE_BELOW, INWARD, OUTWARD, STRAYED
 from crossbody.cases.mechanisms.maze.geometry import maze_of
-from crossbody.cases.mechanisms.maze.numbers import ABOVE, BELOW, CHANNEL, NORMALS, SECTOR_ABOVE, SECTOR_BELOW, SOLID
+from crossbody.cases.mechanisms.maze.rows import ABOVE, BELOW, CHANNEL, NORMALS, SECTOR_ABOVE, SECTOR_BELOW, SOLID
 from crossbody.engines import load as load_engine
 from crossbody.reference.systems import maze as reference
 from crossbody.reports import metrics
@@ -145,7 +145,7 @@ def test_period_inside_a_ring(ring):
     theta = -math.pi / 2.0 if ring == 0 else 0.0
     case, motion = run("inside", ring=ring, theta=theta, t_end=9.0)
     R = float(case.parameters[f"inner{ring}"])
-    exact = cf.period(LOCKED_G, R - 6.35e-3, 1.4, 1e-3)
+    exact = cf.swing_period(LOCKED_G, R - 6.35e-3, 1.4, 1e-3)
     assert measured("swing_period", case, motion) == pytest.approx(exact, rel=1e-6)
 
 

@@ -343,7 +343,7 @@ def opened(s: Scene) -> tuple[Trajectory, float]:
 
 def aside(s: Scene) -> tuple[Trajectory, float]:
     """The flange beside its place at one sample."""
-    from crossbody.cases.mechanisms.delta.metrics import flange
+    from crossbody.cases.mechanisms.delta.claims import flange
 
     p = of_numbers(s.case.parameters)
     k, way = s.sample(), np.zeros(3)

@@ -10,7 +10,7 @@ from known_errors import OFF, Known, Scene, changed, channel
 
 from crossbody.cases import Event, Mode, Switch, Trajectory
 from crossbody.cases.contacts import CLOSED
-from crossbody.cases.mechanisms.cradle.metrics import row
+from crossbody.cases.mechanisms.cradle.claims import row
 from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.cases.mechanisms.red_body.order import STAGES
 

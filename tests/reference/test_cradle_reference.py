@@ -16,7 +16,7 @@ from scipy.special import ellipk
 
 from crossbody.cases import Case, Outcome, Tier, Trajectory, load
 from crossbody.cases import closed_forms as cf
-from crossbody.cases.mechanisms.cradle.metrics import row
+from crossbody.cases.mechanisms.cradle.claims import row
 from crossbody.cases.mechanisms.cradle.motion import Motion
 from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.engines import load as engine

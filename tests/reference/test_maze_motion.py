@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from crossbody.cases import Mode, Outcome, load
 from crossbody.cases.library.ball_maze import VARIANTS
-from crossbody.cases.mechanisms.maze import closed_forms as cf
+from crossbody.cases.mechanisms.maze import claims as cf
 from crossbody.cases.mechanisms.maze.geometry import Ring, maze_of
 from crossbody.reference import prepare, simulate
 from crossbody.reference.options import Options
@@ -82,7 +82,7 @@ def test_published_poles_and_angles():
         assert cf.leave_cosine(0.0, mu) == pytest.approx(cosine, abs=2e-5)
     assert cf.leave_cosine(0.0, 1.4) == pytest.approx(10 / 17)
     assert cf.leave_cosine(0.0, 1.0) == pytest.approx(2 / 3)
-    periods = [cf.period(G, R - 6.35e-3, 1.4, 1e-3) for R in (0.016, 0.036, 0.0562, 0.0763)]
+    periods = [cf.swing_period(G, R - 6.35e-3, 1.4, 1e-3) for R in (0.016, 0.036, 0.0562, 0.0763)]
     assert periods == pytest.approx([0.789814, 1.384439, 1.795122, 2.126450], abs=5e-7)
 
 
@@ -114,7 +114,7 @@ def test_free_maze_without_input_keeps_its_energy():
 
 def test_swing_persists_without_damping_and_decays_with_it():
     """Amplitude falls as exp(-c t/(2.8 m r^2)) for a locked maze."""
-    c, size, t_end = 1e-7, {}, 14.0 * cf.period(G, 0.036 - 6.35e-3, 1.4, 0.02)
+    c, size, t_end = 1e-7, {}, 14.0 * cf.swing_period(G, 0.036 - 6.35e-3, 1.4, 0.02)
     for damping in (0.0, c):
         _, motion = run("inside", rolling_damping=damping, ring=1, angle=0.02, t_end=t_end)
         energy = motion.total_energy + 8.4e-3 * G * (0.036 - 6.35e-3)

@@ -7,8 +7,8 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, UnknownName
-from crossbody.cases.mechanisms.soft import closed_forms as closed
-from crossbody.cases.mechanisms.soft.metrics import invariant
+from crossbody.cases.mechanisms.soft import claims as closed
+from crossbody.cases.mechanisms.soft.claims import invariant
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.engines import load
 from crossbody.reference import simulate

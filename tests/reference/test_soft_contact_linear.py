@@ -9,7 +9,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, InvalidValue, Mode, Outcome
-from crossbody.cases.mechanisms.soft import closed_forms as closed
+from crossbody.cases.mechanisms.soft import claims as closed
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.reference import simulate
 from crossbody.reference.systems import soft_contact as mechanism

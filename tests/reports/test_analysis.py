@@ -9,7 +9,7 @@ import pytest
 
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, InvalidValue, Outcome, SceneError, UnknownName
-from crossbody.cases.mechanisms.maze import closed_forms as maze_forms
+from crossbody.cases.mechanisms.maze import claims as maze_forms
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta.loop import closed_loop
 from crossbody.reference.delta.scene import controller_of, robot_of

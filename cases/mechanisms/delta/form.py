@@ -22,7 +22,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Force, Inputs
 from crossbody.cases.control import Control
 from crossbody.cases.form import Form, formed
-from crossbody.cases.mechanisms.delta import chart, pose
+from crossbody.cases.mechanisms.delta import pose
 from crossbody.cases.mechanisms.delta.controller import MOTORS, Controller
 from crossbody.cases.mechanisms.soft.form import smooth
 from crossbody.cases.parameters import of_numbers
@@ -109,7 +109,7 @@ def scene(p: Mapping[str, float]) -> Scene:
 
 def motion(r: Floats, rd: Floats) -> tuple[Floats, Floats]:
     """Return q and v (n, 9) of a motion of the tree; q_i3 goes on where its angle passes pi."""
-    q, v = chart.from_tree(r, rd)
+    q, v = pose.from_tree(r, rd)
     q[:, 2::3] = np.unwrap(q[:, 2::3], axis=0)
     return q, v
 
@@ -126,8 +126,8 @@ def in_tree(case: Case, powered: bool = True, steady: bool = False) -> Form:
     control = Control(function=Controller(case.parameters), tick=p["period"]) if sampled else None
     return Form(
         case=formed(
-            case, arms, *chart.to_tree(case.q0, case.v0), law=case.law, inputs=inputs, control=control,
+            case, arms, *pose.to_tree(case.q0, case.v0), law=case.law, inputs=inputs, control=control,
             force=Force(function=friction_and_servos, numbers=numbers(p, powered), far=(1.0,) * 9, fast=(1.0,) * 9),
         ),
-        to_case=motion, to_scene=chart.to_tree, bend=chart.bend, rows=tuple(range(len(case.contacts))),
+        to_case=motion, to_scene=pose.to_tree, bend=pose.bend, rows=tuple(range(len(case.contacts))),
     )  # fmt: skip

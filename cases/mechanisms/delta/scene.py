@@ -9,8 +9,8 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Coordinate, Inputs, Law, Parameter, Value
+from crossbody.cases.mechanisms.delta.claims import FOLLOWING, METRICS
 from crossbody.cases.mechanisms.delta.form import in_tree
-from crossbody.cases.mechanisms.delta.metrics import FOLLOWING, METRICS
 
 ROBOT = {
     "r_base": Parameter(default=0.125, unit="m", doc="radius of the hinges on the base", low=0.0),

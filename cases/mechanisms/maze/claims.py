@@ -1,13 +1,115 @@
-"""Numbers that must come out of the ball maze, from closed forms, and how far engines may be off, and why."""
+"""What must come out of the ball maze, from closed forms of a ball on a face; how far engines may be off, and why."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
-from crossbody.cases.case import Claim, Limit, Tier, Value
-from crossbody.cases.mechanisms.maze import closed_forms as cf
+import numpy as np
+
+from crossbody.cases.arrays import Floats
+from crossbody.cases.between import period
+from crossbody.cases.case import Case, CaseMetric, Claim, Limit, Tier, Value
+from crossbody.cases.contacts import at, contacts
 from crossbody.cases.mechanisms.maze.geometry import Maze, tilted_gravity
+from crossbody.cases.trajectory import Trajectory
+
+FACE_BELOW = 0
+
+
+def ring_changes(run: Trajectory, case: Case) -> Floats:
+    """Return the instants at which the ball passed a ring (m,), s."""
+    channel = case.discrete.index("channel")
+    return np.array([switch.t for switch in run.switches if switch.variable == channel])
+
+
+def leaving(run: Trajectory) -> tuple[float, float] | None:
+    """Find angle from the top and its rate, rad and rad/s, where the ball leaves the outer face; None if it stays."""
+    first = next((c for c in contacts(run) if c.row == FACE_BELOW and np.isfinite(c.release)), None)
+    if first is None:
+        return None
+    x, y, xd, yd = (
+        at(run, signal, first.release) for signal in (run.q[:, 1], run.q[:, 2], run.v[:, 1], run.v[:, 2])
+    )  # fmt: skip
+    return float(np.arctan2(x, y)), (y * xd - x * yd) / (x * x + y * y)
+
+
+def _leave_angle(run: Trajectory, case: Case) -> float | None:
+    left = leaving(run)
+    return None if left is None else math.cos(left[0])
+
+
+def _unstable_pole(run: Trajectory, case: Case) -> float | None:
+    """Where the ball leaves the face, by delta'^2 = 2 pole^2 (cos(delta0) - cos(delta)), exact."""
+    left = leaving(run)
+    if left is None:
+        return None
+    angle, rate = left
+    start = math.atan2(run.q[0, 1], run.q[0, 2])
+    return abs(rate) / math.sqrt(2.0 * (math.cos(start) - math.cos(angle)))
+
+
+METRICS = {
+    "leave_angle": CaseMetric(
+        doc="cosine of the angle from the top at which the ball leaves an outer face", number=_leave_angle
+    ),
+    "ring_changes": CaseMetric(
+        doc="how often the ball passes a ring, inward and outward",
+        number=lambda run, case: float(len(ring_changes(run, case))),
+    ),
+    "ring_change_times": CaseMetric(
+        doc="how far the instants at which the ball passes a ring are off", unit="s", instants=ring_changes, always=True
+    ),
+    "swing_period": CaseMetric(
+        doc="period of the ball's swing inside a ring", unit="s", number=lambda run, case: period(run.t, run.q[:, 1])
+    ),
+    "unstable_pole": CaseMetric(
+        doc="rate at which a ball released near the top of an outer face runs away", unit="1/s", number=_unstable_pole
+    ),
+}
+
+
+INERTIA = 0.4  # J/(m r^2) of a solid ball
+
+
+def effective_mass(mass: float, R: float, maze_inertia: float, rolling: bool) -> float:
+    """Mu, the mass that moves along the face over the mass of the ball; 7/5 where the maze is locked."""
+    if not rolling:
+        return 1.0
+    k = INERTIA * mass * R * R
+    return 1.0 + INERTIA * (1.0 - k / (maze_inertia + k))
+
+
+def pole(g: float, rho: float, mu: float) -> float:
+    """Unstable pole on top of an outer face, 1/s: sqrt(g/(mu rho)), sqrt(5 g/(7 rho)) if locked."""
+    return math.sqrt(g / (mu * rho))
+
+
+def leave_cosine(angle: float, mu: float) -> float:
+    """Cosine of the angle from the top where a ball released at rest at `angle` leaves: 2 cos(angle)/(2 + mu).
+
+    10/17 of cos(angle) in a locked maze, 2/3 without friction.
+    """
+    return 2.0 * math.cos(angle) / (2.0 + mu)
+
+
+def swing_period(g: float, rho: float, mu: float, amplitude: float) -> float:
+    """Period of the swing inside a face, s: 2 pi sqrt(mu rho/g) over the mean agm(1, cos(amplitude/2))."""
+    a, b = 1.0, math.cos(0.5 * amplitude)
+    while abs(a - b) > 1e-15:
+        a, b = 0.5 * (a + b), math.sqrt(a * b)
+    return 2.0 * math.pi * math.sqrt(mu * rho / g) / a
+
+
+def balance_gains(p: float) -> tuple[float, float, float]:
+    """(k2, k1, k0) of (s + p)^3."""
+    return 3.0 * p, 3.0 * p * p, p**3
+
+
+def centre_gains(g: float, rho: float, p: float) -> tuple[float, float, float]:
+    """(k2, k1, k0) of (s^2 + w0 s + w0^2)(s + p), w0 the frequency of the ball that rolls to the bottom."""
+    w0 = pole(g, rho, 1.0 + INERTIA)
+    return w0 + p, w0 * w0 + p * w0, p * w0 * w0
 
 
 def claims(variant: str, p: Mapping[str, Value], maze: Maze) -> tuple[Claim, ...]:
@@ -27,13 +129,13 @@ def fallen(p: Mapping[str, Value], maze: Maze) -> float:
         return math.inf
     ring = maze.rings[int(p["ring"])]
     R, rho = (ring.outer, ring.outer + maze.ball) if outer else (ring.inner, ring.inner - maze.ball)
-    turned = cf.pole(tilted_gravity(p), rho, _effective_mass(p, R)) * float(p["t_end"])
+    turned = pole(tilted_gravity(p), rho, _effective_mass(p, R)) * float(p["t_end"])
     grown = math.cosh(min(turned, 100.0)) if outer else math.cos(min(turned, 0.5 * math.pi))
     return abs(math.cos(min(angle * grown, math.pi)) - math.cos(angle))
 
 
 def _effective_mass(p: Mapping[str, Value], R: float) -> float:
-    return cf.effective_mass(float(p["ball_mass"]), R, float(p["maze_inertia"]), bool(p["rolling"]))
+    return effective_mass(float(p["ball_mass"]), R, float(p["maze_inertia"]), bool(p["rolling"]))
 
 
 def _plain(p: Mapping[str, Value], side: str) -> bool:
@@ -52,7 +154,7 @@ def _swing(p: Mapping[str, Value], maze: Maze) -> Iterator[Claim]:
     """The period inside a ring, if the swing meets no gap and is seen often enough."""
     R = maze.rings[int(p["ring"])].inner
     amplitude = abs(float(p["angle"]))
-    period = cf.period(tilted_gravity(p), R - maze.ball, _effective_mass(p, R), amplitude)
+    period = swing_period(tilted_gravity(p), R - maze.ball, _effective_mass(p, R), amplitude)
     seen = amplitude < 0.5 * math.pi and 4.0 * period < float(p["t_end"])
     if seen and _plain(p, "inner") and _clear(p, maze, -0.5 * math.pi, amplitude):
         yield Claim(metric="swing_period", expected=period, tier=Tier.A, source="pendulum of length 7/5 (R - r)")
@@ -62,12 +164,12 @@ def _leave(p: Mapping[str, Value], maze: Maze) -> Iterator[Claim]:
     """Pole on the top, and where the ball leaves the face."""
     R, angle = maze.rings[int(p["ring"])].outer, float(p["angle"])
     mu = _effective_mass(p, R)
-    pole = cf.pole(tilted_gravity(p), R + maze.ball, mu)
-    cosine = cf.leave_cosine(angle, mu)
+    rate = pole(tilted_gravity(p), R + maze.ball, mu)
+    cosine = leave_cosine(angle, mu)
     leaves = math.copysign(math.acos(cosine), angle)
-    early = math.cosh(pole * float(p["t_end"])) > 1.1 * leaves / angle if angle else False
+    early = math.cosh(rate * float(p["t_end"])) > 1.1 * leaves / angle if angle else False
     if early and _plain(p, "outer") and _clear(p, maze, 0.5 * (math.pi - leaves), 0.5 * abs(leaves)):
-        yield Claim(metric="unstable_pole", expected=pole, tier=Tier.A, source="sqrt(5 g/(7 rho)) in a locked maze")
+        yield Claim(metric="unstable_pole", expected=rate, tier=Tier.A, source="sqrt(5 g/(7 rho)) in a locked maze")
         yield Claim(metric="leave_angle", expected=cosine, tier=Tier.A, source="10/17 rolling, 2/3 frictionless")
 
 

@@ -1,4 +1,4 @@
-"""What changes at once in the maze: channel, sectors, the controller's mode, and which row a contact is of.
+"""What changes at once in the maze: channel, sectors, the controller's mode, rows; and the torque that balances.
 
     edge      the ball passes the end of a wall: the row of the face hands its mode to that of the tip there, and back
     middle    its centre passes the circle on which a gap's tips lie: they are those of the ring on its other side
@@ -16,21 +16,33 @@ from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.gates import CHANGED, LOST, SEEN, START, UNCHANGED
-from crossbody.cases.mechanisms.maze.numbers import (
+from crossbody.cases.mechanisms.maze.rows import (
     ABOVE,
     BALANCE,
+    BALL_INERTIA,
+    BALL_MASS,
     BELOW,
     CENTRE,
+    CENTRE0,
+    CENTRE1,
+    CENTRE2,
     CHANNEL,
     COLUMNS,
     CONTROL,
+    DRAG,
     GAPS,
+    GRAVITY,
     INNER,
+    MAZE_INERTIA,
+    MOST_TORQUE,
+    MOST_TURN,
     NORMALS,
     OFF,
+    OMEGA,
     ON,
     OUTER,
     PHASE,
+    RADIUS,
     REACH,
     RINGS,
     SECTOR_ABOVE,
@@ -39,7 +51,12 @@ from crossbody.cases.mechanisms.maze.numbers import (
     SOLID,
     TABLE,
     TARGET,
+    TOP0,
+    TOP1,
+    TOP2,
     TOUCHING,
+    WN,
+    bounded,
     line,
     wrapped,
 )
@@ -167,3 +184,37 @@ def _through_gap(q: Floats, p: Floats, modes: Modes, inward: bool) -> None:
         p[SECTOR_BELOW] = p[SECTOR_ABOVE]
         p[CHANNEL] += 1.0
         p[SECTOR_ABOVE] = _sector(q, p, line(p, False))
+
+
+def force(t: float, q: Floats, v: Floats, p: Floats, out: Floats) -> None:
+    """Write the controller's torque on the maze, and rolling damping between maze and ball."""
+    brake = p[DRAG] * p[TOUCHING] * (v[3] - v[0])
+    out[0], out[1], out[2], out[3] = torque(q, v, p) + brake, 0.0, 0.0, -brake
+
+
+def torque(q: Floats, v: Floats, p: Floats) -> float:
+    """Return that of the controller's mode, N m."""
+    if p[CONTROL] == OFF:
+        return 0.0
+    if p[CONTROL] == SNATCH:
+        turn = bounded(-2.0 * p[WN] * v[0] - p[WN] ** 2 * (q[0] - p[TARGET]), p[MOST_TURN])
+        return bounded(p[MAZE_INERTIA] * turn, p[MOST_TORQUE])
+    if p[CONTROL] == BALANCE:
+        R = p[line(p, True) + OUTER]
+        return _hold(q, v, p, R, R + p[RADIUS], 1.0, p[TOP2], p[TOP1], p[TOP0], p[OMEGA])
+    R = p[line(p, False) + INNER]
+    return _hold(q, v, p, R, R - p[RADIUS], -1.0, p[CENTRE2], p[CENTRE1], p[CENTRE0], 0.0)
+
+
+def _hold(
+    q: Floats, v: Floats, p: Floats, R: float, rho: float, s: float, k2: float, k1: float, k0: float, omega: float
+) -> float:  # fmt: skip
+    """Return the torque that holds a rolling ball, N m: the law above, bounded."""
+    k, x, y = p[BALL_INERTIA] / p[RADIUS] ** 2, q[1], q[2]
+    kk, square = k / p[BALL_MASS], x * x + y * y
+    rate, cosine = (x * v[2] - y * v[1]) / square, x / math.sqrt(square)
+    flat = kk * R * v[0] - (1.0 + kk) * rho * rate
+    off = wrapped(math.atan2(y, x) - 0.5 * math.pi * s)
+    w = -k2 * rate - k1 * off + s * k0 * (flat - kk * R * omega) / p[GRAVITY]
+    turn = bounded(((1.0 + kk) * rho * w + p[GRAVITY] * cosine) / (kk * R), p[MOST_TURN])
+    return bounded(p[MAZE_INERTIA] * turn + k * R * (R * turn - rho * w), p[MOST_TORQUE])

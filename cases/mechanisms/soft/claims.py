@@ -1,12 +1,174 @@
-"""What must come out of the soft contact, and how far engines may be from it."""
+"""What must come out of the soft contact, from closed forms of both pads in contact; how far engines may be off."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 
-from crossbody.cases.case import Claim, Limit, Parameter, Tier, Value
-from crossbody.cases.mechanisms.soft import closed_forms as closed
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crossbody.cases.arrays import Floats
+from crossbody.cases.between import multipliers
+from crossbody.cases.case import Case, CaseMetric, Claim, Limit, Parameter, Tier, Value
+from crossbody.cases.contacts import contacts
+from crossbody.cases.mechanisms.delta import pose
+from crossbody.cases.parameters import of_numbers
+from crossbody.cases.trajectory import Trajectory
+
+SIDES = ("left", "right")
+
+
+def touch(side: str, run: Trajectory, case: Case) -> float | None:
+    """Return when a finger first touches, s; None if it does not."""
+    index = case.contacts.index(side)
+    return min((c.touch for c in contacts(run) if c.row == index), default=None)
+
+
+def imbalance(lam: Floats, case: Case) -> Floats:
+    """Return lam_L - lam_R (n,) of multipliers (n, nc), N."""
+    left, right = (lam[:, case.contacts.index(side)] for side in SIDES)
+    return left - right
+
+
+def _coordinate(case: Case, name: str) -> int:
+    return [c.name for c in case.coordinates].index(name)
+
+
+def block(run: Trajectory, case: Case) -> tuple[Floats, Floats]:
+    """Return position (n,), m, and velocity (n,), m/s, of the block along the fingers."""
+    k = _coordinate(case, "block")
+    return run.q[:, k], run.v[:, k]
+
+
+def flange(run: Trajectory, case: Case) -> Floats:
+    """Return the position of the flange along the fingers (n,), m."""
+    if case.variant == "axis":
+        return run.q[:, _coordinate(case, "flange")]
+    return pose.flanges(of_numbers(case.parameters), run.q[:, :9])[:, 0]
+
+
+def invariant(run: Trajectory, case: Case) -> Floats:
+    """Return x_ref + k (mb b' + bt (b - b0)) + k (y_R - y_L)/ks of every sample (n,), m.
+
+    Of q and v as the reference's mechanisms carry them: the error is the rate of its integral,
+    x_ref = error + flange.
+    """
+    p = {name: case.number(name) for name in ("block_mass", "bt", "ks", "pad_mass")}
+    k = 0.01 * case.number("kstar")
+    b, rate = block(run, case)
+    pads = [run.v[:, _coordinate(case, f"{side} pad")] for side in SIDES]
+    felt = p["ks"] * p["pad_mass"] * np.sum(pads, axis=0)
+    if case.variant == "axis":
+        error = run.v[:, _coordinate(case, "integral of the error")]
+        felt += run.v[:, _coordinate(case, "right sensor")] - run.v[:, _coordinate(case, "left sensor")]
+    else:
+        error = run.v[:, _coordinate(case, "integral of the error x")]
+        felt += run.v[:, _coordinate(case, "difference of the sensors")]
+    kept: Floats = error + flange(run, case) + k * (p["block_mass"] * rate + p["bt"] * (b - b[0]) + felt / p["ks"])
+    return kept
+
+
+def _contact_imbalance(run: Trajectory, case: Case) -> float:
+    """Max |lam_L - lam_R| over the run, between its samples too; NaN where lam is not known."""
+    lam = multipliers(run)
+    return float(np.max(np.abs(imbalance(run.lam if lam is None else lam, case))))
+
+
+def _drift(run: Trajectory, case: Case) -> float:
+    kept = invariant(run, case)
+    return float(np.max(np.abs(kept - kept[0])))
+
+
+METRICS = {
+    "block_end": CaseMetric(
+        doc="where the block stands at the end, along the fingers",
+        unit="m", number=lambda run, case: float(block(run, case)[0][-1]),
+    ),
+    "contact_imbalance": CaseMetric(
+        doc="largest difference of the contact forces on both sides of the block", unit="N", number=_contact_imbalance
+    ),
+    "end_imbalance": CaseMetric(
+        doc="difference of the contact forces at the end: 0 where the block is centred",
+        unit="N", number=lambda run, case: abs(float(imbalance(run.lam, case)[-1])),
+    ),
+    "flange_end": CaseMetric(
+        doc="where the flange stands at the end, along the fingers: who moved, robot or block",
+        unit="m", number=lambda run, case: float(flange(run, case)[-1]),
+    ),
+    "tactile_invariant": CaseMetric(
+        doc="drift of x_ref + k (mb b' + bt (b - b0)) + k (y_R - y_L)/ks, which the tactile loop keeps",
+        unit="m", number=_drift,
+    ),
+    **{
+        f"touch_{side}": CaseMetric(
+            doc=f"instant at which the {side} finger first touches the block", unit="s", number=partial(touch, side)
+        )
+        for side in SIDES
+    },
+}  # fmt: skip
+
+
+Numbers = Mapping[str, float]
+Complex = NDArray[np.complex128]
+
+
+def responses(p: Numbers, omega: ArrayLike) -> tuple[Complex, Complex]:
+    """Frequency responses at omega (m,), rad/s, from the velocity of the fingers.
+
+    Args:
+        p: kp, cp, bt, k, ks, gain_p, gain_d, gain_i, flange_mass, pad_mass, block_mass, SI.
+        omega: angular frequencies, rad/s, above 0.
+
+    Returns:
+        To the difference of the contact forces lam_L - lam_R, N/(m/s); to the velocity of the block, 1.
+    """
+    s = 1j * np.asarray(omega, dtype=np.float64)
+    flexible = 2.0 * (p["kp"] + p["cp"] * s)
+    together = (p["block_mass"] + 2.0 * p["pad_mass"]) * s * s + p["bt"] * s
+    alone = p["block_mass"] * s * s + p["bt"] * s
+    loop = p["gain_d"] * s * s + p["gain_p"] * s + p["gain_i"]
+    sensor = p["ks"] / (s + p["ks"])
+    flange = -(loop * (p["k"] / s) * sensor * alone + s * together / p["flange_mass"]) / (s**3 + loop)
+    share = flexible / (flexible + together)
+    block = share / s / (1.0 - share * flange)
+    return alone * block, s * block
+
+
+def final_position(p: Numbers) -> float:
+    """Where flange and block come to rest, m: offset k bt/(1 + k bt).
+
+    From the invariant x_ref + k (mb b' + bt (b - b0)) + k (y_R - y_L)/ks with equal forces at the end.
+    """
+    product = p["k"] * p["bt"]
+    return p["offset"] * product / (1.0 + product)
+
+
+def held_force(p: Numbers) -> float:
+    """Contact force on each side once the block rests, N: the pad's stiffness times the interference."""
+    return p["kp"] * p["squeeze"]
+
+
+def grasp(p: Numbers, x: float = 0.0) -> tuple[Floats, Floats]:
+    """The equilibrium with the block held at x, m: q (8,) and v (8,) of the mechanism `soft_contact`.
+
+    Both sensors read the held force; flange, block and reference are at x.
+    """
+    half, force = 0.5 * p["width"], held_force(p)
+    q, v = np.zeros(8), np.zeros(8)
+    q[:4] = x, x - half, x + half, x
+    v[5], v[6] = force, force
+    return q, v
+
+
+def touching(p: Numbers, x: float = 0.0) -> tuple[Floats, Floats]:
+    """An equilibrium with the right pad alone against the block, at zero force: the approach's mode set."""
+    q, v = grasp(p, x)
+    q[1] -= 0.01
+    v[5] = v[6] = 0.0
+    return q, v
+
 
 _PROTOTYPE = "an independent prototype of the same equations, to the digits it printed"
 _DIGITS = {"touch_right": 1e-5, "touch_left": 1e-5}  # last digit that the prototype printed
@@ -42,9 +204,9 @@ def _ends(variant: str, k: float, given: Mapping[str, Value]) -> Iterator[Claim]
     """Who has moved: with feedback the robot too."""
     p = {name: float(value) for name, value in given.items()} | {"k": 0.01 * k}
     if k > 0.0:
-        yield Claim(metric="block_end", expected=closed.final_position(p), tier=Tier.A, source="offset k bt/(1 + k bt)")
+        yield Claim(metric="block_end", expected=final_position(p), tier=Tier.A, source="offset k bt/(1 + k bt)")
     if k > 0.0 and variant == "axis":
-        yield Claim(metric="flange_end", expected=closed.final_position(p), tier=Tier.A, source="f_L = f_R at rest")
+        yield Claim(metric="flange_end", expected=final_position(p), tier=Tier.A, source="f_L = f_R at rest")
 
 
 _STIFF = "fifty tolerances of 1e-9 in a pad, over its time constant of 0.5 ms, where the jaws close within seconds"

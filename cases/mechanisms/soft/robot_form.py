@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.case import Case, Force, Law
+from crossbody.cases.case import Case, Force, Law, Parameter
+from crossbody.cases.errors import InvalidValue
 from crossbody.cases.form import Form, formed
-from crossbody.cases.mechanisms.delta import chart, torque
+from crossbody.cases.mechanisms.delta import controller, pose
 from crossbody.cases.mechanisms.delta import form as delta
+from crossbody.cases.mechanisms.delta import scene as robot
+from crossbody.cases.mechanisms.delta.controller import COS, SIN, motor_torque
 from crossbody.cases.mechanisms.delta.form import L1, L2, OFFSET, friction_and_servos
-from crossbody.cases.mechanisms.delta.torque import COS, SIN, motor_torque
 from crossbody.cases.mechanisms.soft.form import (
     CP,
     GAIN_D,
@@ -36,6 +39,51 @@ from crossbody.cases.mechanisms.soft.form import (
 )
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.cases.scene import Body, Joint, Scene, Shape, Tendon
+
+ROBOT = {
+    **robot.ROBOT,
+    "p": replace(robot.ROBOT["p"], default=20.0),
+    "table": Parameter(default=0.62, unit="m", doc="depth of the table"),
+    "high": Parameter(default=0.58, unit="m", doc="depth of the flange at the start and at the end"),
+    "low": Parameter(default=0.60, unit="m", doc="depth of the flange during the grasp"),
+    "descent": Parameter(default=1.0, unit="s", doc="how long it comes down", low=0.0, open_low=True),
+    "rise": Parameter(default=5.2, unit="s", doc="when it begins to rise", low=0.0),
+    "rise_time": Parameter(default=1.0, unit="s", doc="how long it rises", low=0.0, open_low=True),
+}
+COORDINATES = (
+    *((joint, "rad") for joint in robot.JOINTS),
+    ("left pad", "m"), ("right pad", "m"), ("difference of the sensors", "N s"),
+    ("block", "m"), ("block y", "m"), ("block z", "m"),
+    *((f"integral of the error {axis}", "m s") for axis in "xyz"),
+)  # fmt: skip
+CONTACTS = (*robot.LOOPS, "left", "right", "table")
+
+
+def check(p: Mapping[str, float]) -> None:
+    """Check the flange's path.
+
+    Raises:
+        InvalidValue: if it rises before it has come down.
+    """
+    if p["rise"] < p["descent"]:
+        raise InvalidValue(
+            f"soft_contact: rise is {p['rise']:g} s; the flange comes down until descent = "
+            f"{p['descent']:g} s, so it must be at least that."
+        )
+
+
+def start(p: Mapping[str, float]) -> Floats:
+    """Positions (18,): flange high on the axis, jaws open, block on the table.
+
+    Raises:
+        InvalidValue: if the robot cannot reach both depths.
+    """
+    pose.pose(p, np.array([0.0, 0.0, p["low"]]))
+    arms = pose.pose(p, np.array([0.0, 0.0, p["high"]]))
+    half = 0.5 * p["width"]
+    reach = p["jaw"] + half
+    return np.concatenate([arms, [-reach, reach, 0.0], [p["offset"], 0.0, p["table"] - half], np.zeros(3)])
+
 
 HINGES, LEFT, RIGHT, FELT, BLOCK, ERROR = 9, 9, 10, 11, 12, 15
 STATES = ("difference", "error x", "error y", "error z")
@@ -136,7 +184,7 @@ def on_robot(case: Case, powered: bool = True, steady: bool = False) -> Form:
     acting = Force(
         function=_force,
         numbers=np.concatenate([
-            delta.numbers(p, False), [p["sign"]], [p[name] for name in NAMES], path, torque.numbers(p),
+            delta.numbers(p, False), [p["sign"]], [p[name] for name in NAMES], path, controller.numbers(p),
         ]),
         breaks=breaks(p, case.t_end, (p["descent"], p["rise"], p["rise"] + p["rise_time"])),
         rate=fastest(p, p["m3"]), states=STATES,
@@ -159,9 +207,9 @@ def to_case(q: Floats, v: Floats) -> tuple[Floats, Floats]:
 
 def to_scene(q: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Return the scene's states (..., 18) of the case's."""
-    hinges, rates = chart.to_tree(q[..., :HINGES], v[..., :HINGES])
+    hinges, rates = pose.to_tree(q[..., :HINGES], v[..., :HINGES])
     return np.concatenate([hinges, q[..., HINGES:]], axis=-1), np.concatenate([rates, v[..., HINGES:]], axis=-1)
 
 
 def _bend(q: Floats, v: Floats) -> Floats:
-    return np.concatenate([chart.bend(q[:HINGES], v[:HINGES]), np.zeros(len(v) - HINGES)])
+    return np.concatenate([pose.bend(q[:HINGES], v[:HINGES]), np.zeros(len(v) - HINGES)])
