@@ -4,7 +4,7 @@ Most are an arm of two links, told in another way; what it is to be stands besid
 """
 
 from crossbody.cases.files.conformance import contacts, forces, inertias, joints, poses, rows, urdf
-from crossbody.cases.files.conformance.feature import Feature
+from crossbody.cases.files.conformance.arm import Feature
 from crossbody.cases.files.conformance.urdf import TETRAHEDRON
 
 __all__ = ["FEATURES", "TETRAHEDRON", "Feature"]

@@ -14,10 +14,10 @@ from crossbody.cases.files.conformance.arm import (
     SHOULDER,
     UPPER,
     UPPER_INERTIAL,
+    Feature,
     arm,
     mjcf,
 )
-from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.scene import Body, Joint, Loop, Pair, RowLaw, Scene, Shape
 
 FILTER = "Two shapes may touch where a bit of contype of the one is one of conaffinity of the other."

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import arm, mjcf
-from crossbody.cases.files.conformance.feature import Feature
+from crossbody.cases.files.conformance.arm import Feature, arm, mjcf
 from crossbody.cases.files.conformance.joints import AXIS_RULE
 from crossbody.cases.scene import Actuator
 

@@ -9,13 +9,13 @@ import numpy as np
 from crossbody.cases.files.conformance.arm import (
     LOWER_INERTIAL,
     UPPER_INERTIAL,
+    Feature,
     arm,
     mjcf,
     of_shape,
     rotation,
     weighing,
 )
-from crossbody.cases.files.conformance.feature import Feature
 from crossbody.cases.files.inertias import placed, solid
 
 SHAPE_RULE = "A body without <inertial> has the inertia of its geoms: volume times density (1000), or their mass."

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import ELBOW, SECOND, SHOULDER, arm, mjcf, turned, two_trees
-from crossbody.cases.files.conformance.feature import MOTION, Feature
+from crossbody.cases.files.conformance.arm import ELBOW, MOTION, SECOND, SHOULDER, Feature, arm, mjcf, turned, two_trees
 
 AXIS_RULE = (
     "A joint takes what it does not say from its class, and a class what it does not say from the class around it."

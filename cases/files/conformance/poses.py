@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import HAND, LOWER, LOWER_INERTIAL, UPPER, arm, mjcf, turned
-from crossbody.cases.files.conformance.feature import Feature
+from crossbody.cases.files.conformance.arm import HAND, LOWER, LOWER_INERTIAL, UPPER, Feature, arm, mjcf, turned
 from crossbody.cases.scene import Body
 
 POSE_RULE = (

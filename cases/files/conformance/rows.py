@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, SECOND, arm, mjcf, two_trees
-from crossbody.cases.files.conformance.feature import Feature
+from crossbody.cases.files.conformance.arm import LOWER_INERTIAL, SECOND, Feature, arm, mjcf, two_trees
 from crossbody.cases.scene import Actuator, Loop, Tendon
 
 WEIGHT = "The armature a of a tendon adds a J'J to M, J the rates of its length."

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases.files.conformance.arm import HAND, arm, quaternion, rotation, weighing
-from crossbody.cases.files.conformance.feature import MOTION, Feature
+from crossbody.cases.files.conformance.arm import HAND, MOTION, Feature, arm, quaternion, rotation, weighing
 from crossbody.cases.files.inertias import placed
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Body, Loop, Scene
