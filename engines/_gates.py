@@ -13,7 +13,7 @@ from crossbody.cases import Switch
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Force
 from crossbody.cases.gates import CHANGED, LOST, SEEN, START, TOUCHED, Gates
-from crossbody.engines._force import kernel
+from crossbody.engines._acting import kernel
 from crossbody.engines._log import Modes
 
 _V, _M, _B, _I = types.float64[::1], types.float64[:, ::1], types.int8[::1], types.int64

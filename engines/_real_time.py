@@ -1,12 +1,15 @@
-"""Cases whose collisions take no time, as engines have them that integrate every contact."""
+"""Laws that engines integrate in real time: such a case, the steps that resolve it, how deep and fast rows get."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from crossbody.cases import Case, Law
+from crossbody.cases.arrays import Floats
 
 
 def one_set(law: Law) -> Law:
@@ -41,3 +44,38 @@ def followed(case: Case, *, two_sets: bool = False) -> Case | None:
     quick = bool((case.law.b0 > 0.0).any())
     same = case.fsm == "level" and (not quick or (two_sets and case.collisions == "resolved"))
     return None if same else in_real_time(case, two_sets=two_sets)
+
+
+def resolving_step(law: Law, depth: float = 0.0, steps: int = 20) -> float:
+    """A time step with that many steps in half a period of the fastest row, s. inf without a law.
+
+    Args:
+        law: constants of every row; the fast ones count too.
+        depth: penetration at which the cubic part is linearised, m: w^2 = a0 + 3 a2 d^2. a1
+            bounds the step as well.
+        steps: in half a period.
+    """
+    stiffness = np.maximum(law.a0 + 3 * law.a2 * depth**2, law.b0)
+    rate = float(np.max(np.maximum(np.sqrt(stiffness), np.maximum(law.a1, law.b1)), initial=0.0))
+    return math.pi / rate / steps if rate > 0 else math.inf
+
+
+def depths(constants: Floats, h: Floats, hd: Floats, hdd: Floats, opens: Any) -> tuple[Floats, Floats]:
+    """Return how deep and how fast (nc,) rows get if what drives them at the start does so until they close.
+
+    v^2/2 is |h'' h| and what moves and what is stored at the start; a0 d^2/2 + a2 d^4/4 holds it
+    at the deepest.
+
+    Args:
+        constants: a0, a1, a2 (3, nc).
+        h: gaps (nc,) at the start.
+        hd: their rates.
+        hdd: their accelerations with no row acting.
+        opens: which rows can (nc,).
+    """
+    a0, _, a2 = constants
+    stored = np.where((h < 0.0) | ~np.asarray(opens, dtype=bool), a0 * h**2 / 2 + a2 * h**4 / 4, 0.0)
+    energy = 0.5 * hd * hd + np.abs(hdd * h) + stored
+    with np.errstate(divide="ignore", invalid="ignore"):
+        deep: Floats = np.nan_to_num(np.fmin(np.sqrt(2.0 * energy / a0), (4.0 * energy / a2) ** 0.25), posinf=0.0)
+    return deep, np.sqrt(2.0 * energy)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases import CaseUnsupported
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import turned
 from crossbody.cases.scene import WIDTHS, Actuator, Joint, Scene, Vector
@@ -54,11 +54,6 @@ def horner(c: Vector, x: float) -> float:
     for one in reversed(c):
         value = value * x + one
     return value
-
-
-def module_of(case: Case) -> str:
-    """Return the module of an engine that builds a case's model: that of all scenes for one."""
-    return "scene" if case.scene is not None else case.mechanism
 
 
 def places(scene: Scene) -> tuple[dict[str, int], dict[str, int]]:

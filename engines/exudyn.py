@@ -16,7 +16,7 @@ from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
 from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.engines import _scale
+from crossbody.engines import _real_time
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
@@ -243,7 +243,7 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
             "method": Parameter(default=METHODS[0], doc="Runge-Kutta method", choices=METHODS),
             "max_steps": steps,
         }
-    step = min(1e-3, _scale.resolving_step(case.law), case.t_end)
+    step = min(1e-3, _real_time.resolving_step(case.law), case.t_end)
     return {"dt": Parameter(default=step, unit="s", doc="time step", low=0.0, open_low=True), "max_steps": steps}
 
 

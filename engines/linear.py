@@ -84,11 +84,6 @@ class Chart:
         return replace(way, slope=self.slope(way.slope), explained=explained)
 
 
-def same(n: int) -> Chart:
-    """The chart where the engine has the case's coordinates."""
-    return Chart(T=np.eye(n), S=np.eye(n))
-
-
 def in_contact(case: Case) -> Case:
     """The case with the constants of CONTACT as the only ones of its rows."""
     law = case.law

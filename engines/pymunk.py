@@ -14,8 +14,7 @@ from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Shape
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, line
-from crossbody.engines._peer import HIDDEN, PeerRun, why_not
-from crossbody.engines._peer_steps import no_rigid_contact, settings, stepped
+from crossbody.engines._peer import HIDDEN, PeerRun, no_rigid_contact, settings, stepped, why_not
 from crossbody.engines.contract import Engine
 
 ITERATIONS = 200  # of the sequential impulses: enough for five balls in a row to 1e-10 of their momentum

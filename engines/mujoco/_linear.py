@@ -20,20 +20,20 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any
 
 import mujoco
 import numpy as np
 from scipy.linalg import logm
 
-from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases import Case
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines.linear import Spot, Tangent, in_contact
-from crossbody.engines.mujoco._globals import Hook, hooked
+from crossbody.engines.mujoco._model import build, default_step
 from crossbody.engines.mujoco._observe import constraint_jacobian, mass_matrix
 from crossbody.engines.mujoco._rows import LIMITS, TOUCH
+from crossbody.engines.mujoco._scene import Hook, hooked
 
 EPS = 1e-5  # step of the centred differences, in the units of the coordinates
 ONE_SIDED = 1e-6  # the step that MuJoCo's documentation suggests for one-sided differences
@@ -59,12 +59,12 @@ class Stand:
     hook: Hook | None
 
 
-def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, ...]:
-    """What mjd_transitionFD makes of an equilibrium of a case of a mechanism."""
+def linearise(case: Case, spot: Spot) -> tuple[Tangent, ...]:
+    """What mjd_transitionFD makes of an equilibrium of a case."""
     case = in_contact(case)
-    dt = float(mechanism.default_step(case, "matched"))
+    dt = default_step(case, "matched")
     with captured():
-        stand = _stand(mechanism, dt, case, spot)
+        stand = _stand(dt, case, spot)
     with _stepping(stand):
         exact = _pressed(stand, lambda: _extrapolated(stand))
         dt = min(dt, RESOLVED / max(_fastest(exact), RESOLVED / dt))
@@ -80,10 +80,8 @@ def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, .
     )  # fmt: skip
 
 
-def _stand(mechanism: ModuleType, dt: float, case: Case, spot: Spot) -> Stand:
-    """Return the matched scene of a mechanism at an equilibrium."""
-    if (build := getattr(mechanism, "build", None)) is None:
-        raise CaseUnsupported(f"MuJoCo's model of {case.mechanism!r} has other coordinates, without a chart here.")
+def _stand(dt: float, case: Case, spot: Spot) -> Stand:
+    """Return the matched scene at an equilibrium."""
     scene = build(case, "matched", dt)
     for softness in (scene.model.dof_invweight0, scene.model.tendon_invweight0):
         softness[:] *= HARDER

@@ -1,25 +1,149 @@
-"""Stepping: fixed steps, or the same steps cut at the events of the rows.
-
-One evaluation at the start of every step serves the record (lam belongs to that instant), the
-test for events and the integrator's first stage: mj_forward, then the integrator alone, instead
-of mj_step, which would evaluate twice.
-"""
+"""Stepping: fixed steps, or the same cut at the first event of the rows, into a log that MuJoCo writes itself."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
 import mujoco
 import numpy as np
+from scipy.optimize import brentq
 
 from crossbody.cases import Mode, Outcome
+from crossbody.cases.arrays import Floats
 from crossbody.cases.control import NotFinite
-from crossbody.engines._log import Modes
-from crossbody.engines.mujoco._locate import Locator
-from crossbody.engines.mujoco._scene import Scene
-from crossbody.engines.mujoco._tape import Tape
+from crossbody.engines._log import Log, Modes
+from crossbody.engines.mujoco._scene import Prepared
+
+FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC)
+COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
+TOGETHER = 1e-12
+"""Part of a step within which rows cross together: which of them is located first is rounding."""
+TRIALS = 300  # most that one row takes; bisection alone takes 50
+Sign = tuple[int, int, float]
+"""(row, 0 for its gap or 1 for its multiplier, sign that it has in its present mode)."""
+WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
+    FREE: ((0, 1.0),),
+    **dict.fromkeys((CONTACT, COLLISION), ((0, -1.0), (1, 1.0))),
+    **dict.fromkeys((BALLISTIC, SEPARATED), ((0, -1.0), (1, -1.0))),
+}
+
+
+OUTLIVING = WATCHED | dict.fromkeys((CONTACT, COLLISION), ((1, 1.0),))
+"""Of rows that push above their surface too until their multiplier is zero, as the law has it."""
+
+
+def signs(modes: Modes, watched: Mapping[int, tuple[tuple[int, float], ...]] = WATCHED) -> list[Sign]:
+    """What must keep its sign while the modes last."""
+    return [(i, which, sign) for i, mode in enumerate(modes) for which, sign in watched.get(mode, ())]
+
+
+class Locator:
+    """Finds and lands on the first instant of a step at which a row leaves its mode.
+
+    The rows keep the equations of their modes in every trial (a closed one outlives its gap), so that the
+    end of a trial is a smooth function of its length and the order of the integrator survives the event.
+    """
+
+    def __init__(self, scene: Prepared, advance: Callable[[], None], rewind: Callable[[], None]) -> None:
+        assert scene.margins is not None
+        self.model, self.data, self.margins = scene.model, scene.data, scene.margins
+        self.advance, self.rewind, self.outlives, self.entered = advance, rewind, scene.outlives, scene.entered
+        self.watched = OUTLIVING if scene.outlives else WATCHED
+
+    def beyond(self, modes: Modes) -> Modes:
+        """The modes just behind the event: those rows that crossed are taken by their gap and multiplier."""
+        found = [
+            mode if mode not in WATCHED or (self.outlives and mode in (CONTACT, COLLISION) and lam > 0.0)
+            else FREE if h > 0.0 else CONTACT if lam > 0.0 else BALLISTIC
+            for mode, (h, lam) in zip(modes, self.margins(), strict=True)
+        ]  # fmt: skip
+        return self.entered(found)
+
+    def land(self, modes: Modes) -> int:
+        """Redo the step so that it ends just behind its first event; returns the trials that it took.
+
+        It ends behind all rows that cross together there: of those that one motion moves alike
+        any may be the one that bears. A change of constants alone (COLLISION to CONTACT) crosses
+        nothing: it is taken at the end of the step.
+        """
+        if not (crossed := self._crossed(modes)):
+            return 0
+        full, trials = self.model.opt.timestep, 0
+
+        def value(tau: float, row: int, which: int) -> float:
+            nonlocal trials
+            trials += 1
+            self._redo(tau)
+            return self.margins()[row][which]
+
+        roots = []
+        for row, which, sign in crossed:
+            start = value(0.0, row, which)
+            bracketed = sign * start > 0.0
+            try:
+                roots.append(brentq(value, 0.0, full, (row, which), 1e-15 * full, maxiter=TRIALS) if bracketed else 0.0)
+            except ValueError:  # a trial starts from an evaluation of its own, and may just miss what the step passed
+                roots.append(full)
+        tau, nudge = min(roots), 1e-16 * full
+        together = {one for one, root in zip(crossed, roots, strict=True) if root <= tau + TOGETHER * full}
+        self._redo(tau)
+        while not together.issubset(self._crossed(modes)) and tau < full:
+            tau, nudge = min(tau + nudge, full), 2.0 * nudge
+            self._redo(tau)
+            trials += 1
+        return trials
+
+    def _crossed(self, modes: Modes) -> list[Sign]:
+        now = self.margins()
+        # A gap of exactly 0 is closed, a multiplier of exactly 0 does not push.
+        return [s for s in signs(modes, self.watched) if (now[s[0]][s[1]] > 0.0) == (s[2] < 0.0)]
+
+    def _redo(self, tau: float) -> None:
+        self.rewind()
+        self.model.opt.timestep = tau
+        mujoco.mj_forward(self.model, self.data)
+        if tau > 0.0:
+            self.advance()
+            mujoco.mj_forward(self.model, self.data)
+
+
+STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)  # as its own type it costs three times the copy
+"""time, qpos, qvel, act, ...: what a step starts from, inputs apart."""
+
+
+class Tape(Log):
+    """One row an instant; the last row is also the state to which a step returns that overran an event.
+
+    Attributes:
+        rows (capacity, size of the state): the first `n` are written.
+        n: instants recorded.
+    """
+
+    def __init__(self, model: Any, data: Any, capacity: int) -> None:
+        super().__init__()
+        self.model, self.data, self.n = model, data, 0
+        self.rows: Floats = np.empty((max(capacity, 16), mujoco.mj_stateSize(model, STATE)))
+
+    def record(self, lam: Any, mode: Modes) -> None:
+        """Append the present state."""
+        if self.n == len(self.rows):
+            self.rows = np.concatenate((self.rows, np.empty_like(self.rows)))
+        mujoco.mj_getState(self.model, self.data, self.rows[self.n], STATE)
+        self.n += 1
+        self.lam.append(lam)
+        self.mode.append(mode)
+
+    def rewind(self) -> None:
+        """Put the last recorded state back."""
+        mujoco.mj_setState(self.model, self.data, self.rows[self.n - 1], STATE)
+
+    def columns(self) -> tuple[Floats, Floats, Floats]:
+        """Times (n,), qpos (n, nq), qvel (n, nv)."""
+        nq, nv, rows = self.model.nq, self.model.nv, self.rows[: self.n]
+        return rows[:, 0], rows[:, 1 : 1 + nq], rows[:, 1 + nq : 1 + nq + nv]
+
 
 ROUNDS = 20  # of rows that open and close each other at one instant
 SAME_INSTANT = 100  # events in a row without the time moving on that make a cycle
@@ -45,7 +169,7 @@ class March:
         still: events in a row at one instant.
     """
 
-    def __init__(self, scene: Scene, tape: Tape, dt: float, max_steps: int) -> None:
+    def __init__(self, scene: Prepared, tape: Tape, dt: float, max_steps: int) -> None:
         self.scene, self.tape, self.dt, self.max_steps = scene, tape, dt, max_steps
         self.advance = integrator(scene.model, scene.data)
         self.locator = Locator(scene, self.advance, tape.rewind) if scene.arm is not None else None

@@ -1,19 +1,38 @@
-"""What a mechanism's file gives to the stepping loops."""
+"""What a mechanism's file gives to the stepping loops, and what MuJoCo keeps for the whole process."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
+
+import mujoco
 
 from crossbody.cases import Switch
 from crossbody.engines._acting import Acting
 from crossbody.engines._log import Modes, Observe
-from crossbody.engines.mujoco._globals import Hook
+
+Hook = Callable[[Any, Any], None]
+
+
+@contextmanager
+def hooked(hook: Hook | None) -> Iterator[None]:
+    """Call `hook(model, data)` in every evaluation, between the rows' reference accelerations and the solver.
+
+    It sits in the slot of the control callback, which Runge-Kutta visits in every stage.
+    Compiling a model while it is set would call it too: compile before.
+    """
+    previous = mujoco.get_mjcb_control()
+    mujoco.set_mjcb_control(hook)
+    try:
+        yield
+    finally:
+        mujoco.set_mjcb_control(previous)
 
 
 @dataclass(slots=True, kw_only=True)
-class Scene:
+class Prepared:
     """A compiled model with views and closures on it.
 
     The closures read `data` after mj_forward and are called every step: they touch only views

@@ -19,8 +19,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.engines._contacts import Poses, Touches
 from crossbody.engines._rubbing import AT_BOUND, RIGID, Push, steps_of
 from crossbody.engines.nearest import Pose
+from crossbody.engines.pinocchio._model import Bodies, Gaps, mechanics, observer
 from crossbody.engines.pinocchio._rows import mass_matrix, point_jacobian
-from crossbody.engines.pinocchio.scene import Bodies, Gaps, mechanics, observer
 
 RESTS = 1e-12  # gap, m, below which a place counts as closed: rounding of places that rest
 WORST = 1e-6  # largest residual of the conditions, m/s, recomputed here, that still counts as solved

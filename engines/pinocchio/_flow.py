@@ -15,9 +15,8 @@ from crossbody.cases.control import NotFinite
 from crossbody.engines._gates import Gated
 from crossbody.engines._log import Log
 from crossbody.engines._machines import ACTIVE, WATCHED, Fired, Machine, Passed, Settled, first_modes
-from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio._coordinates import Coordinates, World
 from crossbody.engines.pinocchio._rows import ULP, PinRows
-from crossbody.engines.pinocchio._scene import World
 from crossbody.reference.sundials.quiet import quiet
 from crossbody.reference.sundials.solvers import CVODE
 

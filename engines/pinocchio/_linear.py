@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,8 @@ import pinocchio as pin
 from crossbody.cases import Case, CaseUnsupported, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.engines._gates import Gated
-from crossbody.engines.linear import Chart, Spot, Tangent, in_contact, same
+from crossbody.engines.linear import Spot, Tangent, in_contact
+from crossbody.engines.pinocchio._model import build
 from crossbody.engines.pinocchio._native import Native
 from crossbody.engines.pinocchio._rows import PinRows, mass_matrix
 from crossbody.reference.linear.differences import differences
@@ -44,7 +44,6 @@ class Stand:
     Attributes:
         model, data: Pinocchio's.
         q, v (nv,): state.
-        chart: its coordinates and the case's.
         force: tau (nv,), beside gravity and the rows.
         jacobian: q -> H (na, nv) of the rows that are on.
         law: (q, v) -> gamma (na,).
@@ -56,7 +55,6 @@ class Stand:
     data: Any
     q: Floats
     v: Floats
-    chart: Chart
     force: Force
     jacobian: Callable[[Floats], Floats]
     law: Force
@@ -73,41 +71,28 @@ class Stand:
         return self.differenced(self.force)
 
 
-def linearise(mechanism: ModuleType, case: Case, spot: Spot) -> tuple[Tangent, ...]:
-    """What Pinocchio's derivatives make of an equilibrium.
-
-    Args:
-        mechanism: its module here; one with coordinates of its own has `stand(case, spot) -> Stand`.
-        case: the scene.
-        spot: the equilibrium.
-    """
-    case = in_contact(case)
-    own: Callable[[Case, Spot], Stand] = getattr(mechanism, "stand", None) or _same_coordinates(mechanism)
-    stand = own(case, spot)
+def linearise(case: Case, spot: Spot) -> tuple[Tangent, ...]:
+    """What Pinocchio's derivatives make of an equilibrium of a scene."""
+    stand = _stand(in_contact(case), spot)
     right = _by_rnea(stand) if spot.rows else _by_aba(stand)
-    return tuple(stand.chart.tangent(way) for way in (right, *stand.more(stand, right.slope)))
+    return (right, *stand.more(stand, right.slope))
 
 
-def _same_coordinates(mechanism: ModuleType) -> Callable[[Case, Spot], Stand]:
-    """The stand of a mechanism whose coordinates are the case's."""
-
-    def stand(case: Case, spot: Spot) -> Stand:
-        build = getattr(mechanism, "build", None)
-        scene = build(case, "forwardDynamics") if build else None
-        if scene is None or scene.chart is not None:
-            raise CaseUnsupported(f"Pinocchio's model of {case.mechanism!r} has other coordinates, no chart here.")
-        scene.world.change(spot.t, spot.q, spot.v)
-        if scene.world.clock is not None:
-            scene.world.clock(spot.t)
-        found = of_rows(scene.rows, spot)
-        if isinstance(scene.rows.ways, Gated):
-            modes = [int(Mode.CONTACT if i in spot.rows else Mode.FREE) for i in range(scene.rows.nc)]
-            scene.rows.ways.begin(spot.q)
-            scene.rows.ways.hold(spot.q, tuple(modes))
-            found = replace(found, size=CLOSE)
-        return found if scene.rows.native is None else replace(found, more=_constrained(scene.rows.native))
-
-    return stand
+def _stand(case: Case, spot: Spot) -> Stand:
+    """Return the model of a scene at an equilibrium."""
+    scene = build(case, "forwardDynamics")
+    if scene.chart is not None:
+        raise CaseUnsupported(f"Pinocchio's model of {case.mechanism!r} has other coordinates, no chart here.")
+    scene.world.change(spot.t, spot.q, spot.v)
+    if scene.world.clock is not None:
+        scene.world.clock(spot.t)
+    found = of_rows(scene.rows, spot)
+    if isinstance(scene.rows.ways, Gated):
+        modes = [int(Mode.CONTACT if i in spot.rows else Mode.FREE) for i in range(scene.rows.nc)]
+        scene.rows.ways.begin(spot.q)
+        scene.rows.ways.hold(spot.q, tuple(modes))
+        found = replace(found, size=CLOSE)
+    return found if scene.rows.native is None else replace(found, more=_constrained(scene.rows.native))
 
 
 def _constrained(native: Native) -> Callable[[Stand, Floats], tuple[Tangent, ...]]:
@@ -142,7 +127,7 @@ def of_rows(rows: PinRows, spot: Spot) -> Stand:
         return gamma
 
     return Stand(
-        model=rows.model, data=rows.data, q=np.array(spot.q), v=np.array(spot.v), chart=same(len(spot.q)),
+        model=rows.model, data=rows.data, q=np.array(spot.q), v=np.array(spot.v),
         force=force, jacobian=lambda q: np.array(rows.jacobian(q)[on]), law=law,
     )  # fmt: skip
 

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases import Law, Mode
+from crossbody.cases import Case, Law, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import active, elastic_part
 
 if TYPE_CHECKING:
     from crossbody.engines._gates import Gated
+    from crossbody.engines.pinocchio._contacts import Ways
     from crossbody.engines.pinocchio._native import Native
-    from crossbody.engines.pinocchio._ways import Ways
+
 
 Solve = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 """(q, v, J (na, nv), gamma (na,)) -> v' (nv,), lam (na,)."""
@@ -225,3 +226,24 @@ class PinRows:
         X = np.linalg.solve(mass_matrix(self.model, self.data, q), J.T)
         p: Floats = np.asarray(np.linalg.solve(J @ X, -(1.0 + np.array(e)) * (J @ v)))
         return v + X @ p, p
+
+
+def audit(case: Case, rows: PinRows, constants: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Numbers read back from the model, and M(q), bias(q, v), H(q) and lam(q, v) of all rows together.
+
+    lam has no bound: it is what the law of a row just entered asks for, negative where the row would pull.
+    """
+    model, data = rows.model, rows.data
+
+    on = tuple(int(Mode.COLLISION if fast else Mode.CONTACT) for fast in rows.fast)
+    return {
+        "masses": np.array([inertia.mass for inertia in model.inertias[1:]]),
+        "gravity": float(np.linalg.norm(model.gravity.linear)),
+        "constants": constants,
+        "q0": case.q0,
+        "v0": case.v0,
+        "M": lambda q: mass_matrix(model, data, q),
+        "bias": lambda q, v: np.array(pin.nonLinearEffects(model, data, q, v)),
+        "H": rows.jacobian,
+        "lam": lambda q, v: rows.accelerate(q, v, on)[1],
+    }

@@ -871,7 +871,7 @@ def test_a_urdf_has_the_inertias_of_its_own(tmp_path: Path) -> None:
 def test_an_inertia_that_no_body_has_is_the_same_in_pinocchio(tmp_path: Path) -> None:
     import pinocchio as pin
 
-    from crossbody.engines.pinocchio.scene import tree
+    from crossbody.engines.pinocchio._model import tree
 
     path = tmp_path / "arm.urdf"
     path.write_text(URDF.replace('iyy=".2"', 'iyy="-.01"'), encoding="utf-8")

@@ -13,10 +13,10 @@ from crossbody.cases import Law, Mode, Outcome
 pin = pytest.importorskip("pinocchio")
 from crossbody.engines._level_machine import EPS, LevelMachine, least_push  # noqa: E402 - they import the engine's package
 from crossbody.engines._log import Log  # noqa: E402
+from crossbody.engines.pinocchio._coordinates import World  # noqa: E402
 from crossbody.engines.pinocchio._flow import Flow  # noqa: E402
 from crossbody.engines.pinocchio._impulse import ImpulseMachine, Instant, sequential, simultaneous  # noqa: E402
 from crossbody.engines.pinocchio._rows import PinRows  # noqa: E402
-from crossbody.engines.pinocchio._scene import World  # noqa: E402
 
 FREE, CONTACT, COLLISION, SEPARATED = Mode.FREE, Mode.CONTACT, Mode.COLLISION, Mode.COLLISION_SEPARATION
 Array = np.ndarray[Any, Any]

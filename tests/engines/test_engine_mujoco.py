@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, Mode, Outcome
-from crossbody.engines.mujoco._globals import hooked
+from crossbody.engines.mujoco._scene import hooked
 
 mujoco = pytest.importorskip("mujoco")
 FREE, CONTACT, BALLISTIC = Mode.FREE, Mode.CONTACT, Mode.BALLISTIC

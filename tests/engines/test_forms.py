@@ -11,7 +11,7 @@ from crossbody import cases
 from crossbody.cases import Case, SceneError
 from crossbody.cases.case import Force
 from crossbody.cases.form import Form
-from crossbody.engines._force import acting
+from crossbody.engines._acting import acting
 from crossbody.engines._formed import form_of, on_scene
 from crossbody.hw import models
 from crossbody.hw.models.contract import Segment

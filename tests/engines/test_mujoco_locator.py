@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Mode
-from crossbody.engines.mujoco._locate import Locator
+from crossbody.engines.mujoco._march import Locator
 
 STEP = 1e-3
 

@@ -19,9 +19,9 @@ from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load
 from crossbody.engines.equations import system_of
-from crossbody.engines.mujoco._globals import hooked
+from crossbody.engines.mujoco._model import matched
+from crossbody.engines.mujoco._scene import hooked
 from crossbody.engines.mujoco._switched import Switched
-from crossbody.engines.mujoco.scene import matched
 
 STATES = 6
 SAME = 1e-5

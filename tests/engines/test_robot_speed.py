@@ -22,9 +22,9 @@ from crossbody import cases, engines
 from crossbody.cases import Case
 from crossbody.cases.files.warned import captured
 from crossbody.cases.rotations import differences
-from crossbody.engines.mujoco.scene import matched
+from crossbody.engines.mujoco._model import matched
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio.scene import tree
+from crossbody.engines.pinocchio._model import tree
 from crossbody.reference.tree import layout
 
 pytestmark = pytest.mark.bench

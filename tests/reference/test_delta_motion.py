@@ -107,7 +107,7 @@ def test_impulse_changes_the_momentum_that_the_loops_leave_free():
 def test_pulse_under_servos_agrees_with_pinocchio():
     """5 s at rtol 1e-10 against Pinocchio's constrained dynamics through SciPy's DOP853 at 1e-13."""
     pytest.importorskip("pinocchio")
-    from crossbody.engines.pinocchio.scene import build
+    from crossbody.engines.pinocchio._model import build
 
     robot = delta.LIGHT
     q0 = delta.inverse(robot, (0.0, 0.0, 0.6))

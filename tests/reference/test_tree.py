@@ -24,7 +24,7 @@ from crossbody.engines.equations import system_of
 from crossbody.engines.mujoco import _build as build
 from crossbody.engines.pinocchio._coordinates import Coordinates
 from crossbody.engines.pinocchio._joined import Strings
-from crossbody.engines.pinocchio.scene import Gaps, spans, tree
+from crossbody.engines.pinocchio._model import Gaps, spans, tree
 from crossbody.reference.tree import mechanism, quantities, switches
 from crossbody.reference.tree.table import tabulate
 

@@ -141,8 +141,8 @@ def test_where_lam_is_ill_posed_its_force_is_compared_instead(tilt: int) -> None
     """H loses rank: no lam is reported; H^T lam is unique and the same in Pinocchio, MuJoCo and least squares."""
     pin = pytest.importorskip("pinocchio")
     mujoco = pytest.importorskip("mujoco")
-    from crossbody.engines.mujoco.scene import matched
-    from crossbody.engines.pinocchio.scene import build
+    from crossbody.engines.mujoco._model import matched
+    from crossbody.engines.pinocchio._model import build
 
     robot = delta.LIGHT
     q = hanging_pose(robot, delta.ill_posed_tilts(robot)[tilt])

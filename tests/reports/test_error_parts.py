@@ -319,9 +319,9 @@ def test_parts_that_are_not_the_whole_error_are_outside(
 
 def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A reader that takes one body for heavier than it is: its share does not shrink with the step."""
-    from crossbody.engines.mujoco import scene
+    from crossbody.engines.mujoco import _model
 
-    own = scene._from_file
+    own = _model._from_file
 
     def wrong(case: Case) -> Any:
         model = own(case)
@@ -332,7 +332,7 @@ def test_another_mass_is_an_error_of_the_importer(tmp_path: Path, monkeypatch: p
     path.write_text(SOFT.format(solref="-1e4 -200"), encoding="utf-8")
     case = cases.load(str(path), t_end=0.5)
     right = jobs.run_case(case, choice.picks(["mujoco:as_is"]))
-    monkeypatch.setattr(scene, "_from_file", wrong)
+    monkeypatch.setattr(_model, "_from_file", wrong)
     run = engines.load("mujoco").prepare(case, "as_is").run()
     assert right.entries[0].study is not None
     found = splits(case, right.truth, run, right.entries[0].study)["position"]

@@ -19,7 +19,7 @@ from crossbody.cases.scene import Loop, Scene
 from crossbody.cases.scene_contacts import contacts, rows_of
 from crossbody.engines._scene import Forces
 from crossbody.engines.pinocchio._coordinates import Coordinates
-from crossbody.engines.pinocchio.scene import Gaps, spans, tree
+from crossbody.engines.pinocchio._model import Gaps, spans, tree
 from crossbody.reference.tree import mechanism, quantities
 from crossbody.reference.tree.table import tabulate
 

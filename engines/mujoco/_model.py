@@ -21,19 +21,18 @@ from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
 from crossbody.cases.scene_contacts import frictional, rough, rows_of, under_law
 from crossbody.engines._acting import Acting
-from crossbody.engines._force import acting as acting_of
+from crossbody.engines._acting import acting as acting_of
 from crossbody.engines._gates import ALL_AT_ONCE
+from crossbody.engines._real_time import depths, resolving_step
 from crossbody.engines._real_time import followed as real_time
-from crossbody.engines._scale import depths, resolving_step
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of, without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._gated import GatedRows
-from crossbody.engines.mujoco._globals import Hook, hooked
 from crossbody.engines.mujoco._observe import constraint_jacobian, mass_matrix, numbers
 from crossbody.engines.mujoco._obvious import Obvious, obvious
 from crossbody.engines.mujoco._rows import Rows
-from crossbody.engines.mujoco._scene import Scene as Prepared
+from crossbody.engines.mujoco._scene import Hook, Prepared, hooked
 from crossbody.engines.mujoco._switched import Switched
 
 CONE = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}

@@ -17,20 +17,17 @@ from crossbody.cases.scene import Body, Joint, Scene, Tendon
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import _scene as parts
 from crossbody.engines._acting import Acting
-from crossbody.engines._force import acting as acting_of
+from crossbody.engines._acting import acting as acting_of
 from crossbody.engines._gates import ALL_AT_ONCE, Gated
 from crossbody.engines._log import Observe
+from crossbody.engines._real_time import depths
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._rubbing import why_no_steps
-from crossbody.engines._scale import depths
-from crossbody.engines.pinocchio._contacts import Points, contact_rows
-from crossbody.engines.pinocchio._coordinates import Coordinates
+from crossbody.engines.pinocchio._contacts import Points, Ways, contact_rows
+from crossbody.engines.pinocchio._coordinates import Coordinates, Prepared, World
 from crossbody.engines.pinocchio._joined import Joined, Spans, Strings, by_least_norm, loose_rows, none_pulling
 from crossbody.engines.pinocchio._native import Native, apt
 from crossbody.engines.pinocchio._rows import Chosen, PinRows, mass_matrix, point_jacobian, pose
-from crossbody.engines.pinocchio._scene import Scene as Prepared
-from crossbody.engines.pinocchio._scene import World
-from crossbody.engines.pinocchio._ways import Ways
 
 RULES_FOLLOWED = {"impulse": "sequential", "impulse_simultaneous": "simultaneous"}
 """Profiles with impacts in no time, and the rule that each has for several of them."""
