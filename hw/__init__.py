@@ -27,24 +27,21 @@ if TYPE_CHECKING:
         maps,
         parse_columns,
     )
-    from crossbody.hw.reading.draft import draft_text
     from crossbody.hw.reading.log import Channel, Log, Provenance, Repair
     from crossbody.hw.reading.read import Scan, check, parts, read, scan
     from crossbody.hw.reading.rows import Rows
     from crossbody.hw.reading.store import store
-    from crossbody.hw.reading.survey import GroupSurvey, Survey, survey
+    from crossbody.hw.reading.survey import GroupSurvey, Survey, draft_text, survey
     from crossbody.hw.replaying.comparison import Comparison, Prediction
     from crossbody.hw.replaying.inverse import Inferred, estimate_force, inverse
     from crossbody.hw.replaying.replay import replay
     from crossbody.hw.replaying.sensors import Sensor, unlagged
     from crossbody.hw.replaying.tracked import track_force
-    from crossbody.hw.synthetic.log import Sensors, delta_log
-    from crossbody.hw.synthetic.plant import Plant, Push, delta_plant
+    from crossbody.hw.synthetic import Plant, Push, Sensors, delta_log, delta_plant
 
 _HOMES = {
     "reading.columns": ("Columns", "Role", "Signal", "Time", "dump_columns", "load_columns", "maps", "parse_columns"),
     "replaying.comparison": ("Comparison", "Prediction"),
-    "reading.draft": ("draft_text",),
     "checks.finding": ("Finding",),
     "fitting.fit": ("Agreement", "Estimate", "Fit"),
     "fitting.identify": ("identify",),
@@ -56,9 +53,8 @@ _HOMES = {
     "replaying.tracked": ("track_force",),
     "replaying.sensors": ("Sensor", "unlagged"),
     "reading.store": ("store",),
-    "synthetic.log": ("Sensors", "delta_log"),
-    "synthetic.plant": ("Plant", "Push", "delta_plant"),
-    "reading.survey": ("GroupSurvey", "Survey", "survey"),
+    "synthetic": ("Plant", "Push", "Sensors", "delta_log", "delta_plant"),
+    "reading.survey": ("GroupSurvey", "Survey", "draft_text", "survey"),
 }
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}
 

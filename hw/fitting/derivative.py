@@ -16,8 +16,8 @@ from crossbody.cases import UnknownName, Value
 from crossbody.cases.arrays import Floats
 from crossbody.engines.equations import system_of
 from crossbody.hw.fitting.covariance import Layout
-from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.rk4 import march
+from crossbody.hw.fitting.search import Deadline
 from crossbody.hw.models.contract import Model
 from crossbody.hw.windows.lift import check_measured, lift
 from crossbody.hw.windows.window import Window, overlap

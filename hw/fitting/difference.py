@@ -15,11 +15,10 @@ from scipy import stats
 from crossbody.cases import InvalidValue, UnknownName, Value
 from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.covariance import Layout
-from crossbody.hw.fitting.deadline import Deadline
 from crossbody.hw.fitting.derivative import apart
+from crossbody.hw.fitting.search import Deadline
 from crossbody.hw.models.contract import Model
-from crossbody.hw.windows.run import run_window
-from crossbody.hw.windows.window import Window, overlap
+from crossbody.hw.windows.window import Window, overlap, run_window
 
 STEP = 0.1  # step of a derivative, as a part of the parameter
 

@@ -12,12 +12,11 @@ from crossbody.cases import InvalidValue, SceneError, Value, arguments
 from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.hw import models
-from crossbody.hw.fitting.deadline import Deadline, TimeOver
 from crossbody.hw.fitting.derivative import DELAY, Exact
 from crossbody.hw.fitting.difference import Differences
 from crossbody.hw.fitting.fit import Fit
 from crossbody.hw.fitting.judged import Search, judged, unjudged
-from crossbody.hw.fitting.search import search
+from crossbody.hw.fitting.search import Deadline, TimeOver, search
 from crossbody.hw.models.contract import Model
 from crossbody.hw.reading.log import Log
 from crossbody.hw.windows.window import Window, windows

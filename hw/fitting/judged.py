@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Value
 from crossbody.cases.arrays import Floats
-from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Scatter, scatter
 from crossbody.hw.fitting.derivative import DELAY, Exact
+from crossbody.hw.fitting.doubts import agreement, moves, profiles
 from crossbody.hw.fitting.fit import CONVERGED, STOPPED, UNCONVERGED, Agreement, Estimate, Fit
 from crossbody.hw.fitting.information import WEIGHT, in_words, information, unseen_by, weak
-from crossbody.hw.fitting.profile import profiles
 from crossbody.hw.fitting.search import Found
-from crossbody.hw.fitting.start_noise import moves
 from crossbody.hw.models.contract import Model
 
 TOGETHER = 0.999  # correlation from which on two parameters are told apart by nothing but noise

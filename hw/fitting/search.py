@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,8 +13,28 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from crossbody.cases.arrays import Floats
-from crossbody.hw.fitting.deadline import TimeOver
 from crossbody.hw.fitting.information import information, to_keep, unseen_by
+
+
+class TimeOver(Exception):  # noqa: N818 - no error: it ends an identification
+    """The time for all of it is over."""
+
+
+class Deadline:
+    """A time limit, s from now on, that is looked at before every run of a window."""
+
+    def __init__(self, seconds: float = math.inf) -> None:
+        self.seconds, self._end = seconds, time.monotonic() + seconds
+
+    def check(self) -> None:
+        """Go on, or stop.
+
+        Raises:
+            TimeOver: if the time is over.
+        """
+        if time.monotonic() > self._end:
+            raise TimeOver
+
 
 NOISE = 1e-6
 """Of the sum of squares that one residual has in the mean: what the search still gains when it ends."""

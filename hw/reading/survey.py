@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import LogFormatError, arguments
+from crossbody.cases import InvalidValue, LogFormatError, arguments
 from crossbody.cases.arrays import Floats
 from crossbody.hw import formats
 from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.checks.finding import Finding
 from crossbody.hw.checks.values import ValueCheck
 from crossbody.hw.formats import Column, Group, Reader
-from crossbody.hw.reading.clock_guess import ClockGuess, guess_clock
-from crossbody.hw.reading.columns import Columns, load_columns
+from crossbody.hw.reading.clock_guess import ClockGuess, guess_clock, last_word, looks_like_time
+from crossbody.hw.reading.columns import Columns, Role, Signal, Time, dump_columns, load_columns, safe_name
+from crossbody.hw.reading.units import to_si
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,8 +91,6 @@ class Survey:
 
     def draft(self) -> Columns:
         """A column map to begin with: roles and missing units are guessed from names."""
-        from crossbody.hw.reading.draft import draft
-
         return draft(self)
 
     def refuse(self) -> None:
@@ -197,3 +198,65 @@ def _column(column: Column, check: ValueCheck) -> ColumnSurvey:
 def largest(groups: Sequence[GroupSurvey]) -> GroupSurvey:
     """The group to begin with: one that has a clock, then the one with most numbers."""
     return max(groups, key=lambda g: (g.clock is not None or g.group.step > 0.0, g.rows * len(g.columns)))
+
+
+PATTERNS = (
+    (Role.VELOCITIES, r"(v|w|dq|qd|dth|vel|velocity|omega|rate|speed)\w{0,3}(\[\d+\])?"),
+    (Role.COORDINATES, r"(q|th|theta|phi|angle|pos|position|enc|encoder)\w{0,3}(\[\d+\])?|[xyz]\d?|p[xyz]"),
+    (Role.INPUTS, r"(u|tau|torque|cmd|command|effort)\w{0,3}(\[\d+\])?"),
+    (Role.REFERENCES, r"(r|ref|reference|target|setpoint|des|desired)\w{0,3}(\[\d+\])?"),
+)
+USUAL = {Role.COORDINATES: "rad", Role.VELOCITIES: "rad/s", Role.INPUTS: "N m", Role.REFERENCES: "1", Role.SENSORS: "1"}
+ADMITTED = {Role.COORDINATES: ("rad", "m", "1"), Role.VELOCITIES: ("rad/s", "m/s", "1/s")}
+
+
+def draft(found: Survey) -> Columns:
+    """A map that reads what was surveyed; see `Survey.draft`."""
+    main = largest(arguments.instance("found", found, Survey, "what `survey` found").groups)
+    unit = main.clock.unit if main.clock else None
+    tables: dict[str, dict[str, Signal]] = {role.value: {} for role in Role}
+    for group in (main, *(g for g in found.groups if g is not main and g.clock and g.clock.unit == unit)):
+        for one in group.columns:
+            if not looks_like_time(one.column.name) and not (group.clock and one.column.name == group.clock.column):
+                _add(tables, one.column, group, group is main)
+    step = None if main.clock or main.group.step else 1.0
+    time = Time(column=main.clock.column if main.clock else "", unit=unit, sample_time=step)
+    joined = any(signal.time for table in tables.values() for signal in table.values())
+    how: Literal["hold", "exact"] = "hold" if joined else "exact"
+    columns = Columns(format=found.format, options=dict(found.options), join=how, time=time)
+    return msgspec.structs.replace(columns, **tables)
+
+
+def _add(tables: dict[str, dict[str, Signal]], column: Column, group: GroupSurvey, own: bool) -> None:
+    unit, word = _si(column), last_word(column.name)
+    role = next((role for role, pattern in PATTERNS if re.fullmatch(pattern, word)), Role.SENSORS)
+    if unit is not None and unit not in ADMITTED.get(role, (unit,)):
+        role = Role.SENSORS
+    table = tables[role.value]
+    name = safe_name(word + "".join(re.findall(r"\[\d+\]$", column.name)))
+    if name in table:
+        name = safe_name(column.name)
+    while name in table:
+        name += "_"
+    clock = "" if own or group.clock is None else group.clock.column
+    table[name] = Signal(column=column.name, unit=None if unit is not None else USUAL[role], time=clock)
+
+
+def _si(column: Column) -> str | None:
+    """SI unit of what the file calls the column's unit; None if it says nothing that can be understood."""
+    try:
+        return to_si(column.unit).si if column.unit else None
+    except InvalidValue:
+        return None
+
+
+def draft_text(found: Survey) -> str:
+    """The draft as TOML, with what was guessed in a comment above."""
+    columns = draft(found)
+    guessed = [f"{role.value}.{name} [{s.unit}]" for role, name, s in columns.signals() if s.unit is not None]
+    lines = ["# Draft: roles and names are guessed from the columns' names; check every line."]
+    if guessed:
+        lines.append("# Units that the file does not tell, guessed: " + ", ".join(guessed))
+    if columns.time.sample_time is not None:
+        lines.append("# No column of times was found: set the sample time, s.")
+    return "\n".join([*lines, dump_columns(columns)])

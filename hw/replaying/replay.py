@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any
@@ -21,12 +22,12 @@ from crossbody.cases import (
 from crossbody.cases.arrays import Floats
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.hw import models
+from crossbody.hw.fitting.derivative import Exact
 from crossbody.hw.models.contract import Model
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying.comparison import Comparison, Prediction
-from crossbody.hw.replaying.starts import fitted_starts
-from crossbody.hw.windows.run import run_window
-from crossbody.hw.windows.window import Window, windows
+from crossbody.hw.windows.rates import HALF
+from crossbody.hw.windows.window import Window, run_window, windows
 
 KINDS = ("forward", "closed_loop")
 
@@ -133,3 +134,41 @@ def _seen(model: Model, run: Trajectory, window: Window) -> tuple[Floats, Floats
     each = [model.see(model, run, np.ascontiguousarray(age)) for age in window.age.T]
     y, yd = (np.column_stack([pair[j][:, i] for i, pair in enumerate(each)]) for j in (0, 1))
     return y, yd
+
+
+ROUNDS = 2
+"""Of Gauss and Newton with the first derivatives: few samples are all but linear in the start."""
+
+
+def fitted_starts(model: Model, numbers: Mapping[str, Value], cut: Sequence[Window], span: float) -> tuple[Window, ...]:
+    """The windows with starts that fit their first `span` seconds best, by the model and its recorded inputs.
+
+    A polynomial through the samples beside an instant knows nothing of the torques; at the first sample
+    of a log, where there is none before it, its rate is tens of times noisier than that of the model.
+    """
+    return tuple(_fitted(model, numbers, window, span) for window in cut)
+
+
+def _fitted(model: Model, numbers: Mapping[str, Value], window: Window, span: float) -> Window:
+    count = max(2 * HALF, int(np.searchsorted(window.t - window.t[0], span)))
+    short = _shortened(window, min(count, len(window.t)))
+    problem = Exact(model, numbers, (), (short,), True, 1)
+    x = problem.first()
+    J = problem.jacobian(x)
+    for _ in range(ROUNDS):
+        x = x - np.linalg.lstsq(J, problem.residual(x), rcond=None)[0]
+    y, yd = np.split(x, 2)
+    return replace(window, segment=replace(window.segment, y=y, yd=yd))
+
+
+def _shortened(window: Window, count: int) -> Window:
+    segment = window.segment
+    driven = bool(len(segment.times))
+    return replace(
+        window, t=window.t[:count], age=window.age[:count], y=window.y[:count], u=window.u[:count],
+        segment=replace(
+            segment, t_end=float(window.t[count - 1] - window.t[0]),
+            times=segment.times[: count - 1] if driven else segment.times,
+            inputs=segment.inputs[: count - 1] if driven else segment.inputs,
+        ),
+    )  # fmt: skip

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, toeplitz
 
-from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Layout, noise_correlation, scatter
+from crossbody.hw.fitting.doubts import agreement
 
 LAYOUTS = (
     Layout(samples=(40,), k=1), Layout(samples=(25, 31), k=2), Layout(samples=(30,) * 5, k=1),

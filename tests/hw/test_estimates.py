@@ -8,8 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import signal, stats
 
-from crossbody.hw.fitting.agreement import agreement
 from crossbody.hw.fitting.covariance import Layout, _lagged, scatter, whiteness
+from crossbody.hw.fitting.doubts import agreement
 from crossbody.hw.fitting.information import in_words, information, to_keep, unseen_by
 from crossbody.hw.replaying.inverse import noise_of
 from crossbody.hw.windows.rates import derivatives, felt

@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 from crossbody import hw
 from crossbody.cases import InvalidValue
 from crossbody.hw import models
-from crossbody.hw.fitting import deadline
+from crossbody.hw.fitting import search
 from crossbody.hw.fitting.derivative import Exact
-from crossbody.hw.fitting.start_noise import moves
+from crossbody.hw.fitting.doubts import moves
 from crossbody.hw.windows.window import windows
 
 NOISE = 1e-3
@@ -103,7 +103,7 @@ def test_an_identification_stops_at_its_time_limit_with_what_it_reached(
     runs: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = itertools.count()  # a clock that every look moves by a second
-    monkeypatch.setattr(deadline, "time", SimpleNamespace(monotonic=lambda: float(next(now))))
+    monkeypatch.setattr(search, "time", SimpleNamespace(monotonic=lambda: float(next(now))))
     fit = fitted(swing(0), time_limit=runs + 0.5)
     assert (fit.outcome, fit.success) == ("stopped", False)
     assert f"Stopped at the time limit of {runs + 0.5:g} s" in fit.message

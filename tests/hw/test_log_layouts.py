@@ -12,7 +12,7 @@ import pytest
 from crossbody import hw
 from crossbody.cases import LogFormatError
 from crossbody.hw.formats import csv
-from crossbody.hw.reading.draft import draft_text
+from crossbody.hw.reading.survey import draft_text
 
 SEEDS = range(25)
 FACTORS = {"deg": np.pi / 180.0, "mm": 1e-3, "rpm": np.pi / 30.0, "mN m": 1e-3, "1": 1.0}

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crossbody.hw.fitting.profile import POINTS, SPAN, profiles
+from crossbody.hw.fitting.doubts import POINTS, SPAN, profiles
 
 FREE = (np.full(3, -np.inf), np.full(3, np.inf))
 

@@ -14,8 +14,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.hw.models.contract import Segment
 from crossbody.hw.replaying.comparison import Comparison, Prediction
 from crossbody.hw.windows import window as cutting
-from crossbody.hw.windows.run import REFERENCE, run_window
-from crossbody.hw.windows.window import Window
+from crossbody.hw.windows.window import REFERENCE, Window, run_window
 
 STEP, MASS = 0.01, 2.5
 LENGTHS = (100, 140, 60, 110)

@@ -1,1 +1,0 @@
-"""Logs of a rig that MuJoCo computed; they are no measurement."""
