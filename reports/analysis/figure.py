@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 
 from crossbody.reports.analysis.bode import OUTPUTS, UNITS
-from crossbody.reports.figures.panels import Panels
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES, LEVEL
+from crossbody.reports.figures.styles import COLOURS, DASHES, LEVEL, Panels
 
 RESPONDING = 1e-12  # part of the largest magnitude below which a response is none
 

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pandas as pd
 
-from crossbody.reports.figures.panels import Panels
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES
+from crossbody.reports.figures.styles import COLOURS, DASHES, Panels
 
 APART = 1.0  # decades of error between two labels of a line, twice the decades of time
 

@@ -20,7 +20,7 @@ from crossbody.reports.importers.audit import Audit, audited
 from crossbody.reports.importers.causes import advice, explained, parts
 from crossbody.reports.importers.compare import FAILED, QUANTITIES, UNSEEN, UNSUPPORTED, WRONG, Row
 from crossbody.reports.importers.fix import MARK, fixed
-from crossbody.reports.importers.lines import files_of
+from crossbody.reports.importers.forms import files_of
 
 WIDTH, FIRST, COLUMN = 80, 13, 11
 """Columns of a page at most, of the names of quantities, and of an engine at least."""

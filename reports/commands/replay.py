@@ -18,8 +18,8 @@ from crossbody.reports.commands.shared import identity, where
 from crossbody.reports.figures.section import records
 from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.pages import site as page
+from crossbody.reports.replay import comparison, kept
 from crossbody.reports.replay import comparison as replay
-from crossbody.reports.replay import kept, limits
 from crossbody.reports.runs import choice, output, study, watch
 from crossbody.reports.runs.choice import DEFAULT_ENGINES
 from crossbody.reports.runs.parts import Parts
@@ -82,7 +82,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
     """
     hw.models.load(ask.model)
     output.check(out, "replay")
-    given = limits.parse(ask.limits)
+    given = comparison.parse(ask.limits)
     engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
     if not engines:
         raise CaseUnsupported(f"None of the requested engines returned: {'; '.join(watch.all_lost())}.")
@@ -98,7 +98,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
             restart=ask.restart, horizon=ask.horizon, delay=ask.delay, tell=tell, keep=kept.keeper(parts),
         )  # fmt: skip
         watch.unlimited()
-        limits.check(given, found)
+        comparison.check(given, found)
         rows = replay.verdicts(found, command, given)
         _write(out, found, rows, provenance(command, log=replay.log_about(found)), {}, "replay")
     metrics = _metrics(found, rows)
@@ -141,7 +141,7 @@ def run_identify(
     """
     model = hw.models.load(ask.model)
     output.check(out, "identify")
-    asked = limits.parse(ask.limits)
+    asked = comparison.parse(ask.limits)
     log, given = ask.log(), choice.parse_settings(ask.pairs)
     label = f"{ask.model} identified from {ask.path}"
     if why := watch.lost(label):
@@ -162,7 +162,7 @@ def run_identify(
         "sensitivities": fit.sensitivities, "covariance": fit.covariance, "warnings": list(fit.warnings),
         "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message, "outcome": fit.outcome,
     }  # fmt: skip
-    limits.check(asked, found, (limits.HELD,))
+    comparison.check(asked, found, (comparison.HELD,))
     rows = replay.verdicts(found, command, asked, fit)
     tables["held_out"]["verdict"] = _held_verdicts(fit, rows)
     drawn = {"identify-profile": replay.profile(fit), "identify-correlation": replay.correlation(fit)}
@@ -206,7 +206,7 @@ def held_out(fit: Fit) -> pd.DataFrame:
 
 def _held_verdicts(fit: Fit, rows: pd.DataFrame) -> list[str]:
     """What is said of every row of `held_out`: the rmse alone is judged."""
-    word = rows.loc[rows["metric"] == limits.HELD, "verdict"]
+    word = rows.loc[rows["metric"] == comparison.HELD, "verdict"]
     return [word.iloc[0] if name == "rmse" and len(word) else Word.INFO.value for name in fit.before]
 
 
@@ -216,7 +216,7 @@ def _metrics(found: Comparison, rows: pd.DataFrame) -> pd.DataFrame:
     said = rows.drop_duplicates(["engine", "profile", "metric"]).set_index(["engine", "profile", "metric"])
     told = [
         {"who": f"{r.engine}:{r.profile}", "metric": r.metric, "channel": r.channel, "value": r.value, "unit": r.unit}
-        | said.loc[(r.engine, r.profile, limits.label(r)), ["expected", "limit", "verdict"]].to_dict()
+        | said.loc[(r.engine, r.profile, comparison.label(r)), ["expected", "limit", "verdict"]].to_dict()
         for r in found.rows()
     ]  # fmt: skip
     return pd.DataFrame(told, columns=columns)

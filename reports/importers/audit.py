@@ -26,8 +26,8 @@ from crossbody.reports.importers.compare import Row, rows
 from crossbody.reports.importers.declared import excused
 from crossbody.reports.importers.expected import expected, job_of
 from crossbody.reports.importers.forms import Forms
-from crossbody.reports.importers.lines import named as lines_named
-from crossbody.reports.importers.solids import SINGLE
+from crossbody.reports.importers.forms import named as lines_named
+from crossbody.reports.importers.parts import SINGLE
 
 FIRST, BEHIND = "mujoco", 5
 """Reader whose answer is to come first, as the other yardstick, and how nice the others are to it and us."""

@@ -19,8 +19,7 @@ from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSUPPORTED, W
 from crossbody.reports.importers.compare import rows as compared
 from crossbody.reports.importers.conformance import judged_all
 from crossbody.reports.importers.fix import fixed
-from crossbody.reports.importers.forms import Forms, removed
-from crossbody.reports.importers.lines import Node, Place, names, with_lines
+from crossbody.reports.importers.forms import Forms, Node, Place, names, removed, with_lines
 
 TELLS = "The engine reads it as something else; say it in the engine."
 PLAIN = ("arm", "shapes that may touch", "URDF: arm", "URDF: link without mass", "URDF: inertia of the root")

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.cases.files.urdf import PLANAR
-from crossbody.reports.importers import motion, parts, solids
-from crossbody.reports.importers.gap import Gap, reach
+from crossbody.reports.importers import motion, parts
+from crossbody.reports.importers.parts import Gap, reach
 
 TOLERANCE = 1e-9  # of the largest entry: the same physics
 OK, WRONG, UNSUPPORTED, FAILED, NONE, UNSEEN = "ok", "wrong", "unsupported", "failed", "-", "not shown"
@@ -214,10 +214,10 @@ def gaps(
     yield "loops", parts.loops(found, wanted)
     yield "actuators", parts.actuators(found, wanted, [] if off else names)
     if not off and "shapes" not in wanted["unseen"]:
-        of = solids.matched(found, wanted)
-        yield "shapes", solids.shapes(found, wanted, of)
-        yield "contacts", solids.contacts(found, wanted, of)
-        yield "surfaces", solids.surfaces(found, wanted, of)
+        of = parts.matched(found, wanted)
+        yield "shapes", parts.shapes(found, wanted, of)
+        yield "contacts", parts.contacts(found, wanted, of)
+        yield "surfaces", parts.surfaces(found, wanted, of)
     if not off:
         yield "softness", parts.softness(found, wanted)
         yield "keyframes", parts.keyframes(found, wanted)

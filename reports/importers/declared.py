@@ -8,8 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from crossbody.reports.importers.compare import FAILED, NONE, OK, SAID, UNSUPPORTED, WRONG, Row, rows
-from crossbody.reports.importers.forms import Forms, removed
-from crossbody.reports.importers.lines import Node, Place
+from crossbody.reports.importers.forms import Forms, Node, Place, removed
 
 ATTRIBUTE = re.compile(r"attribute '(\w+)' found in an? '(\w+)' tag", re.I)
 CHILD = re.compile(r"tag '(\w+)' found as a child of '(\w+)'", re.I)

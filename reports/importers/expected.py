@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Pair, Scene, Shape, Tendon
 from crossbody.engines.importers.beside.solids import boxes, composite, posed
-from crossbody.reports.scenes.kinematics import body_poses
+from crossbody.reports.scenes.scene import body_poses
 
 SEED, DRAWN, KEYS = 20241123, 4, 4
 """Of the random states, their number, and how many keyframes stand beside them."""

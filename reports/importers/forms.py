@@ -1,4 +1,7 @@
-"""Changed forms of a robot file, each opened once, in a folder that looks like the user's and is not."""
+"""Where the elements of a robot file stand, and changed forms of it, each opened once.
+
+A form is opened in a folder that looks like the user's and is not.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,82 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from crossbody.cases import CrossbodyError
-from crossbody.reports.importers.lines import Node, Place, with_lines
+from crossbody.cases.regular import open_regular
+
+Node = ElementTree.Element
+Place = tuple[Path, int]
+
+
+def with_lines(path: Path, folder: Path | None = None) -> tuple[Node, dict[Node, Place]]:
+    """Return the root of a file, what it includes in its place, and file and line of every element and <include>.
+
+    Args:
+        path: of the file, whose includes were looked at before.
+        folder: of the file that includes it.
+    """
+    builder, parser, places = ElementTree.TreeBuilder(), expat.ParserCreate(), dict[Node, Place]()
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        places[builder.start(tag, attributes)] = (path, parser.CurrentLineNumber)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, builder.end
+    with open_regular(path) as file:
+        parser.ParseFile(file)
+    root, folder = builder.close(), folder or path.parent
+    for node in list(root.iter()):
+        for child in [child for child in node if child.tag == "include"]:
+            try:
+                part, own = with_lines(folder / child.get("file", ""), folder)
+            except (OSError, expat.ExpatError):
+                continue
+            at = list(node).index(child)
+            node[at : at + 1] = list(part)
+            places |= own
+    return root, places
+
+
+def files_of(path: Path) -> set[Path]:
+    """Return the files that a robot file is made of: itself, what it includes, what its parts name."""
+    try:
+        root, places = with_lines(path)
+    except expat.ExpatError:
+        return {path.resolve()}
+    folders = [path.parent, *(path.parent / one.get(key, "") for one in root.iter("compiler") for key in (
+        "meshdir", "texturedir", "assetdir"))]  # fmt: skip
+    named = {node.get(key, "") for node in root.iter() for key in ("file", "filename")} - {""}
+    return {file.resolve() for file, _ in places.values()} | {
+        (base / name).resolve() for base in folders for name in named
+    }
+
+
+def names(node: Node, around: Mapping[Node, Node]) -> set[str]:
+    """Return the names of a part, of its children, of what it speaks of and of its body."""
+    own = {node, *node}
+    if node.tag not in ("body", "link") and node in around and around[node].tag in ("body", "link", "joint"):
+        own |= {around[node], *around[node]}
+    return {one.get(key, "") for one in own for key in ("name", "class", "joint", "joint1", "joint2", "body1", "body2",
+                                                       "tendon")} - {""}  # fmt: skip
+
+
+def named(path: Path) -> dict[int, dict[str, set[str]]]:
+    """Return line of a file -> tag -> names of the parts that stand there, or of the body around them."""
+    try:
+        root, places = with_lines(path)
+    except expat.ExpatError:
+        return {}
+    around, found = {child: node for node in root.iter() for child in node}, dict[int, dict[str, set[str]]]()
+    for node, (file, line) in places.items():
+        if file == path and node.tag not in ("worldbody", "mujoco", "robot", "default", "compiler", "option"):
+            parts = {node} if node.get("name") else {node, around.get(node, node)}
+            here = found.setdefault(line, {}).setdefault(node.tag, set())
+            here.update(name for one in parts for name in own_names(one))
+    return found
+
+
+def own_names(node: Node) -> set[str]:
+    """Return the names that an element says."""
+    return {node.get(key, "") for key in ("name", "joint", "joint1", "body1", "tendon")} - {""}
+
 
 LEVELS = 4  # folders above a file that are there for its meshes
 Change = Callable[[Node, Mapping[Node, Place]], None]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.reports.importers.gap import Gap, lacks, reach
+from crossbody.reports.importers.parts import Gap, lacks, reach
 
 FLOOR = 1e-4
 """Part of the largest force that is the scale of the smallest ones: rounding is that of their sums."""

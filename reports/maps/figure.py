@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from crossbody.reports.figures.panels import Panels
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES
+from crossbody.reports.figures.styles import COLOURS, DASHES, Panels
 from crossbody.reports.maps.gapmap import PATTERN
 
 FAILED = {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": "crimson"}}

@@ -15,9 +15,8 @@ from crossbody.reports.judging.told import share
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import suits
-from crossbody.reports.pages.friction import friction
+from crossbody.reports.pages.friction import friction, hysteresis
 from crossbody.reports.pages.html import Page
-from crossbody.reports.pages.hysteresis import hysteresis
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results

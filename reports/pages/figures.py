@@ -15,8 +15,7 @@ from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.scale import energy as energy_of
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.sheet import Sheet
-from crossbody.reports.pages.strips import changing, modes
+from crossbody.reports.pages.sheet import Sheet, changing, modes
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import POINTS
 

@@ -18,6 +18,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
+import numpy as np
+
 from crossbody.cases import Value
 from crossbody.cases.arrays import Floats
 from crossbody.cases.registry import Registry
@@ -106,3 +108,17 @@ def box(x: float, y: float, width: float, height: float) -> Shape:
 def path(points: Any, *, closed: bool = False) -> Shape:
     """A line, or a solid if closed."""
     return {"points": [[float(c) for c in point] for point in points], "closed": closed, "fill": closed}
+
+
+def pushes(centres: Floats, lam: Floats, radius: float) -> Floats:
+    """Both arrows of every pair of neighbours: on the left ball and on the right one (centres in m, lam in N).
+
+    Returns:
+        Point and force (n, 2 (balls - 1), 4), m and N.
+    """
+    apart = np.diff(centres, axis=1)
+    along = apart / np.maximum(np.linalg.norm(apart, axis=2, keepdims=True), 1e-300)
+    force = along * lam[:, :, None]
+    left = np.concatenate([centres[:, :-1] + radius * along, -force], axis=2)
+    right = np.concatenate([centres[:, 1:] - radius * along, force], axis=2)
+    return np.concatenate([left, right], axis=1)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.reports.scenes import Parameters, Stage, circle, path
-from crossbody.reports.scenes._rows import pushes
+from crossbody.reports.scenes import Parameters, Stage, circle, path, pushes
 
 
 def _pivots(p: Parameters) -> Floats:

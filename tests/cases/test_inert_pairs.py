@@ -12,7 +12,7 @@ from crossbody import cases, engines
 from crossbody.cases.scene import UPRIGHT, Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_contacts import contacts, inert
 from crossbody.engines.nearest import meet
-from crossbody.reports.scenes.kinematics import body_poses, placed
+from crossbody.reports.scenes.scene import body_poses, placed
 
 INERTIA = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
 ALONG = (("slide", (1.0, 0.0, 0.0)), ("slide", (0.0, 1.0, 0.0)), ("hinge", (0.0, 0.0, 1.0)))

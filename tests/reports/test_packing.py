@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from unpacked import text_of, value_of
 
 from crossbody.reports.figures.styles import coded
-from crossbody.reports.pages.packing import packed_text, packed_value
+from crossbody.reports.pages.html import packed_text, packed_value
 
 
 @given(st.text())

@@ -28,8 +28,7 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.html import Page, file_name
-from crossbody.reports.pages.kept import KeptTemplates
+from crossbody.reports.pages.html import KeptTemplates, Page, file_name
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder

@@ -13,7 +13,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.engines import load as load_engine
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.figures import force, note, suits
-from crossbody.reports.pages.hysteresis import hysteresis
+from crossbody.reports.pages.friction import hysteresis
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.runs.jobs import run_case
 from crossbody.reports.runs.store import Trace

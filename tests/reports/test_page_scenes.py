@@ -20,7 +20,7 @@ from crossbody.reports import scenes
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.pages.case_page import PLOTTED
 from crossbody.reports.pages.figures import FIGURES, points_for
-from crossbody.reports.pages.packing import packed_value
+from crossbody.reports.pages.html import packed_value
 from crossbody.reports.pages.playback import chosen, packed, peaks, playback
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace

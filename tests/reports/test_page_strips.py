@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Mode, Trajectory
-from crossbody.reports.pages.strips import MODE_COLOURS, changing, modes
+from crossbody.reports.pages.sheet import MODE_COLOURS, changing, modes
 from crossbody.reports.runs.store import Trace
 
 CONTACTS = ("left", "right", "below", "still")

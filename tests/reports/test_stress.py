@@ -34,8 +34,8 @@ from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, r
 from crossbody.reports.sweep.map import MAP, stability_map, summary
 from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, lasting, residual
 from crossbody.reports.sweep.minimise import failures, shrink
+from crossbody.reports.sweep.pools import together
 from crossbody.reports.sweep.spec import Spec
-from crossbody.reports.sweep.together import together
 
 REFERENCE = Pick(engine="reference", profile="compiled")
 AXES = {"a0": Log(1e2, 1e6), "mass": Linear(0.5, 2.0)}

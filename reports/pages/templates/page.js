@@ -11,7 +11,7 @@ const crossbody = (() => {
     look(document);
     on("unfolded", look);
   };
-  // What packing.py folded: a text, or a value whose arrays stand behind its JSON.
+  // What html.py folded: a text, or a value whose arrays stand behind its JSON.
   const inflated = (element) => {
     const bytes = Uint8Array.from(atob(element.textContent), (c) => c.charCodeAt(0));
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
