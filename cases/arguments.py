@@ -16,22 +16,14 @@ LONGEST_NAME, LONGEST_PATH = 255, 4095  # bytes that file systems take of a name
 
 
 def instance(where: str, value: object, kind: type[_Kind] | tuple[type[_Kind], ...], wanted: str) -> _Kind:
-    """Return a value of a type.
-
-    Raises:
-        InvalidValue: if it is of another; `wanted` says in words what it must be.
-    """
+    """Return a value of a type."""
     if not isinstance(value, kind):
         raise InvalidValue(f"{where} is {shown(value)}; it must be {wanted}.")
     return value
 
 
 def path(where: str, value: object) -> str:
-    """Return a path as text.
-
-    Raises:
-        InvalidValue: if it is none, or no file system can have it.
-    """
+    """Return a path as text."""
     if not isinstance(value, (str, os.PathLike)) or "\0" in (text := str(value)) or not text:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a path.")
     try:
@@ -46,11 +38,7 @@ def path(where: str, value: object) -> str:
 
 
 def texts(where: str, value: object) -> tuple[str, ...]:
-    """Return names as a tuple.
-
-    Raises:
-        InvalidValue: if it is no list of texts; one text alone is none.
-    """
+    """Return names as a tuple."""
     listed = isinstance(value, Collection) and not isinstance(value, (str, bytes)) and not hasattr(value, "dtype")
     if not listed or not all(isinstance(one, str) for one in cast("Collection[object]", value)):
         raise InvalidValue(f"{where} is {shown(value)}; it must be a list of names.")
@@ -58,22 +46,14 @@ def texts(where: str, value: object) -> tuple[str, ...]:
 
 
 def whole(where: str, value: object, low: int = 1) -> int:
-    """Return a whole number.
-
-    Raises:
-        InvalidValue: if it is none, below the lowest that is valid, or beyond 64 bits.
-    """
+    """Return a whole number."""
     if not isinstance(value, numbers.Integral) or not low <= int(value) < 2**63:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a whole number from {low} on.")
     return int(value)
 
 
 def real(where: str, value: object) -> float:
-    """Return a number as a float; infinite ones too.
-
-    Raises:
-        InvalidValue: if it is no real number, or not a number.
-    """
+    """Return a number as a float; infinite ones too."""
     if not _is_number(value):
         raise InvalidValue(f"{where} is {shown(value)}; it must be a number.")
     try:
@@ -91,11 +71,7 @@ def _is_number(value: Any) -> TypeGuard[float]:
 
 
 def flag(where: str, value: Any) -> bool:
-    """Return a switch.
-
-    Raises:
-        InvalidValue: if it is neither true nor false (nor 1 nor 0).
-    """
+    """Return a switch."""
     if not _is_number(value) or value not in (0, 1):
         raise InvalidValue(f"{where} is {shown(value)}; valid: True, False.")
     return bool(value)

@@ -14,11 +14,7 @@ Bytes = NDArray[np.int8]
 
 
 def frozen(owner: str, field: str, value: Any, shape: tuple[int | None, ...], dtype: DTypeLike = np.float64) -> Any:
-    """Copy `value` into a read-only array of the given shape (None admits any length).
-
-    Raises:
-        SceneError: naming the owner, the field, the shape found and the shape wanted.
-    """
+    """Copy `value` into a read-only array of the given shape (None admits any length)."""
     array = numbers(owner, field, value, dtype)
     if array.ndim != len(shape) or any(w is not None and g != w for g, w in zip(array.shape, shape, strict=True)):
         wanted = str(tuple("any" if w is None else w for w in shape)).replace("'", "")
@@ -28,11 +24,7 @@ def frozen(owner: str, field: str, value: Any, shape: tuple[int | None, ...], dt
 
 
 def numbers(owner: str, field: str, value: Any, dtype: DTypeLike = np.float64) -> Any:
-    """Copy `value` into an array of whatever shape it has.
-
-    Raises:
-        SceneError: naming the owner and the field, if it holds anything but numbers.
-    """
+    """Copy `value` into an array of whatever shape it has."""
     if type(value) is np.ndarray and value.dtype == dtype:
         return np.array(value, order="C")
     try:

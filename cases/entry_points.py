@@ -162,11 +162,7 @@ def _table(key: Check | None, check: Check | None, where: str, value: Any) -> Ma
 
 
 def finite(where: str, value: object) -> float:
-    """Return a finite number as a float.
-
-    Raises:
-        InvalidValue: if it is none.
-    """
+    """Return a finite number as a float."""
     number = real(where, value)
     if not math.isfinite(number):
         raise InvalidValue(f"{where} is {shown(value)}; it must be finite.")
@@ -174,11 +170,7 @@ def finite(where: str, value: object) -> float:
 
 
 def wholes(where: str, value: object) -> tuple[int, ...]:
-    """Return whole numbers as a tuple.
-
-    Raises:
-        InvalidValue: if it is no list of whole numbers.
-    """
+    """Return whole numbers as a tuple."""
     listed = isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping, set))
     if not listed or len(getattr(value, "shape", (0,))) != 1:
         raise InvalidValue(f"{where} is {shown(value)}; it must be a list of whole numbers.")

@@ -66,11 +66,7 @@ def _every_entry_point() -> Any:
 
 
 def version(name: str) -> str:
-    """Return the version of a distribution, which `importlib.metadata.version` does by parsing its whole README.
-
-    Raises:
-        PackageNotFoundError: if it is not installed.
-    """
+    """Return the version of a distribution, which `importlib.metadata.version` does by parsing its whole README."""
     from importlib.metadata import distribution
 
     found = distribution(name)
@@ -79,13 +75,7 @@ def version(name: str) -> str:
 
 
 def use(files: Iterable[str | os.PathLike[str]]) -> None:
-    """Import files as plug-ins of this process; one that it has already is left as it is.
-
-    Raises:
-        NoFile: for a path at which there is none.
-        InvalidValue: for a file of another kind, one that defines no plug-in, or a name that is taken.
-        SceneError: if a file cannot be imported, with the line, or what it defines is not valid.
-    """
+    """Import files as plug-ins of this process; one that it has already is left as it is."""
     for file in files:
         path = Path(arguments.path("plug-in", file)).expanduser().resolve()
         if path not in _FILES:
@@ -120,11 +110,7 @@ def _check(path: Path, module: ModuleType) -> None:
 
 
 def configured(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
-    """Return the files that the pyproject.toml of a folder names, or of the nearest one above it.
-
-    Raises:
-        InvalidValue: if it cannot be read, or [tool.crossbody] says what it cannot say.
-    """
+    """Return the files that the pyproject.toml of a folder names, or of the nearest one above it."""
     given = Path(folder).absolute()
     places = (here / "pyproject.toml" for here in (given, *given.parents))
     found = next(filter(os.path.isfile, places), None)
@@ -170,10 +156,6 @@ def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
         kind: what it holds, for example "case", "plugin" or "controller".
         path: of the file.
         known: names that would be valid in its place.
-
-    Raises:
-        NoFile: if it is not there.
-        SceneError: if it cannot be imported, with the line.
     """
     spec = importlib.util.spec_from_file_location(f"crossbody_{kind}_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():

@@ -30,11 +30,7 @@ def parted(name: str) -> tuple[str, str | None]:
 
 
 def chosen(name: str, variant: str | None = None) -> tuple[str, str | None]:
-    """Return a case's name and the variant that is asked for, by the name or beside it.
-
-    Raises:
-        InvalidValue: if these are two.
-    """
+    """Return a case's name and the variant that is asked for, by the name or beside it."""
     case, own = parted(name)
     if own is not None and variant not in (None, own):
         raise InvalidValue(f"The case is {name!r}, and the variant {shown(variant)}; give one of them.")
@@ -92,9 +88,6 @@ def named(made: object, label: str, numbers: Mapping[str, Value]) -> Case:
         made: a case, or a scene.
         label: CASE:VARIANT, the name of a case that has none.
         numbers: the parameters; t_end is a scene's horizon, s.
-
-    Raises:
-        SceneError: for anything else.
     """
     if isinstance(made, Scene):
         made = case_of(made, t_end=float(numbers.get("t_end", 1.0)))

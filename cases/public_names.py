@@ -130,21 +130,13 @@ def what_is_missing(module: ModuleType) -> str:
 
 
 def check(module: ModuleType, group: str) -> None:
-    """Refuse a plug-in that cannot be one of its kind.
-
-    Raises:
-        SceneError: naming the file, the public name, what it is and what would be valid.
-    """
+    """Refuse a plug-in that cannot be one of its kind."""
     kind = KINDS[group]
     check_values(f"The {kind.name} file {module.__file__}", module, kind.defines)
 
 
 def check_values(where: str, owner: object, wanted: Mapping[str, Public], prefix: str = "") -> None:
-    """Refuse what has not all the attributes that are wanted, or a wrong one.
-
-    Raises:
-        SceneError: beginning with `where`.
-    """
+    """Refuse what has not all the attributes that are wanted, or a wrong one."""
     for name, public in wanted.items():
         if not hasattr(owner, name):
             raise SceneError(f"{where} does not define {prefix}{name}; valid: {public.valid}.")

@@ -49,12 +49,7 @@ class Registry:
         return tuple(sorted({*self.own(), *self._installed()}))
 
     def load(self, name: str) -> ModuleType:
-        """Import one plug-in.
-
-        Raises:
-            UnknownName: if there is no such plug-in.
-            SceneError: if it is installed, and lacks a public name of its kind or has a wrong one.
-        """
+        """Import one plug-in."""
         if isinstance(name, str) and name in self.own():
             return importlib.import_module(f"{self.package}.{name}")
         module = self._installed().get(name) if isinstance(name, str) else None

@@ -16,9 +16,6 @@ def open_regular(path: str | Path, flags: int = 0, folder: int | None = None) ->
         path: the file.
         flags: of `os.open`, beside reading.
         folder: descriptor of the folder that the path is relative to.
-
-    Raises:
-        OSError: EINVAL for what is no regular file, otherwise as `os.open`.
     """
     never_wait = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_CLOEXEC", 0)
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0) | never_wait | flags, dir_fd=folder)

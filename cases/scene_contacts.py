@@ -277,11 +277,7 @@ def unknown(scene: Scene) -> dict[frozenset[str], str]:
 
 
 def check_pairs(scene: Scene) -> None:
-    """Refuse pairs that have no rows though their shapes may meet.
-
-    Raises:
-        SceneError: naming the first one, what is wrong with it, and what would be valid.
-    """
+    """Refuse pairs that have no rows though their shapes may meet."""
     inert_, shapes = inert(scene), {shape.name: shape for shape in scene.shapes}
     for pair in (found for found in _all(scene) if isinstance(found, Pair) and found not in inert_):
         one, two = sorted((shapes[pair.first], shapes[pair.second]), key=lambda shape: shape.type != "plane")

@@ -28,11 +28,7 @@ def _plain(value: Any) -> Any:
 
 
 def scene_from(values: Any) -> Scene:
-    """Return the scene that `plain` has written.
-
-    Raises:
-        SceneError: for what is none, with what `Scene` says of it.
-    """
+    """Return the scene that `plain` has written."""
     groups = _parts()
     try:
         parts = {name: tuple(map(kind, values.get(name, ()))) for name, kind in groups.items()}

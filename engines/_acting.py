@@ -97,9 +97,6 @@ class Acting:
             t: the instant, s.
             q: positions (nq,) there in the case's coordinates.
             v: velocities (nv,).
-
-        Raises:
-            ControlError, NotFinite: as `Controller`.
         """
         total = np.zeros(self.values.shape[1]) if self.case.inputs is None else self.case.inputs.at(t)
         if self.controller is not None:

@@ -20,12 +20,7 @@ WIDER = "The engine's joints hold what rows of the case hold: its coordinates ar
 
 
 def form_of(case: Case, powered: bool = True, steady: bool = False) -> Form | None:
-    """Return the form of a case, if it has one; without servos that are not powered, or without a sampled controller.
-
-    Raises:
-        SceneError: for a start that the case's equations refuse.
-        CaseUnsupported: for what the case's own scene cannot say.
-    """
+    """Return the form of a case, if it has one; without servos that are not powered, or a sampled controller."""
     if case.form is None:
         return None
     if (check := getattr(module(case.mechanism), "check_start", None)) is not None:

@@ -44,9 +44,6 @@ class Budget:
         most: bytes that may be decoded in all.
         seconds: of processor time that parsing may take in all.
         taken: of it so far.
-
-    Raises:
-        InvalidValue: if `memory` is no whole number above 0.
     """
 
     def __init__(self, path: Path, memory: int = MEMORY) -> None:
@@ -59,22 +56,13 @@ class Budget:
         self._ceiling = min(_private() + self.memory, sys.maxsize)
 
     def hold(self, declared: int, what: str) -> None:
-        """Refuse something that would be in memory at once and is larger than that may be.
-
-        Raises:
-            LogFormatError: with both sizes.
-        """
+        """Refuse something that would be in memory at once and is larger than that may be."""
         if declared > self.memory:
             text = f"{what} needs {_shown(declared)} in memory; {self._hint(self.memory)}"
             raise LogFormatError(self._path, text)
 
     def spend(self, decoded: int) -> None:
-        """Count what was decoded, and look at the clock of this thread.
-
-        Raises:
-            LogFormatError: if the file unfolds to more than it may in all, or takes longer than
-                any log of its size.
-        """
+        """Count what was decoded, and look at the clock of this thread."""
         taken = self.taken + (0.0 if math.isnan(self._entered) else time.thread_time() - self._entered)
         if taken > self.seconds:
             text = f"takes more than {self.seconds:.3g} s to unfold, as no log of {_shown(self.size)} does"
@@ -89,9 +77,6 @@ class Budget:
         """Bound the private memory of the process while a library parses; where there are other threads, do nothing.
 
         The bound is one of the process: threads that have nothing to do with the file must not meet it.
-
-        Raises:
-            LogFormatError: where memory was denied.
         """
         before = _lowered(self._ceiling)
         self._entered = time.thread_time()

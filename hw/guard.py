@@ -34,9 +34,6 @@ def parsing(path: Path, what: str, row: int | None = None, column: str = "") -> 
         what: what the parser took it for, for example "MAT file".
         row: row that is being read, if one is.
         column: column that is being read, if one is.
-
-    Raises:
-        LogFormatError: for whatever the parser raised.
     """
     try:
         with warnings.catch_warnings(), _silent(), redirect_stdout(StringIO()), redirect_stderr(StringIO()):

@@ -27,9 +27,6 @@ def case(name: str) -> Named:
 
     Args:
         name: of a case, or the path of a file with one.
-
-    Raises:
-        CrossbodyError: if there is no such case.
     """
     from crossbody import cases
     from crossbody.cases import loading
@@ -55,11 +52,7 @@ def _parameter(one: Parameter) -> str:
 
 
 def engine(name: str) -> Named:
-    """Return profiles of an engine, and versions of its packages.
-
-    Raises:
-        CrossbodyError: if there is no such engine, or it is not installed.
-    """
+    """Return profiles of an engine, and versions of its packages."""
     from crossbody import engines
 
     found = engines.load(name)
@@ -67,11 +60,7 @@ def engine(name: str) -> Named:
 
 
 def one(name: str) -> Named:
-    """Return what can be asked of the case, file or engine of that name.
-
-    Raises:
-        CrossbodyError: if there is none.
-    """
+    """Return what can be asked of the case, file or engine of that name."""
     from crossbody import cases, engines
     from crossbody.cases.loading import parted
 

@@ -30,9 +30,6 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
     Args:
         path: a CSV or Parquet table with a head, or an NPZ with t (m,) and ctrl (m, nu).
         scene: whose actuators they are.
-
-    Raises:
-        InvalidValue: if it cannot be read, times do not increase, or an actuator has no column.
     """
     names = [actuator.name for actuator in scene.actuators]
     if not path.is_file():
@@ -98,11 +95,7 @@ def _check_size(size: int) -> None:
 
 
 def read_control(text: str, tick: float) -> Control:
-    """Return the controller FILE.py:NAME.
-
-    Raises:
-        InvalidValue, UnknownName, SceneError: if it is not there, cannot be imported or cannot be called.
-    """
+    """Return the controller FILE.py:NAME."""
     file, colon, name = text.rpartition(":")
     if not (colon and file.endswith(".py") and name.isidentifier()):
         raise InvalidValue(f"control is {shown(text)}; valid: FILE.py:NAME of a callable of (t, q, v), or of a class.")
@@ -113,12 +106,7 @@ def read_control(text: str, tick: float) -> Control:
 
 
 def under(case: Case, control: Control) -> Case:
-    """Return a scene's case with a controller in place of the controls that a keyframe holds.
-
-    Raises:
-        InvalidValue: if it has a table of controls too.
-        SceneError: for a scene without actuators.
-    """
+    """Return a scene's case with a controller in place of the controls that a keyframe holds."""
     if case.parameters.get("ctrl"):
         raise InvalidValue(f"{case.label} has a table of controls (ctrl) and a controller; valid: one of them.")
     inputs = case.inputs
@@ -137,9 +125,6 @@ def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Input
         scene: without pushes.
         inputs: its controls.
         text: BODY FX FY FZ T0 T1, in N and s, of every push; they are parted by a semicolon.
-
-    Raises:
-        InvalidValue: naming what is wrong with a push.
     """
     if not (given := [_push(part, scene) for part in text.split(";") if part.strip()]):
         return scene, inputs

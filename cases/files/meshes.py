@@ -23,11 +23,7 @@ TEXT = re.compile(rb"\s*solid\b[^\0]*\bfacet\b")
 
 
 def content(path: Path) -> bytes:
-    """Return what a mesh's file holds.
-
-    Raises:
-        SceneError: for a file that is not there, cannot be read, or is larger than `BYTES`.
-    """
+    """Return what a mesh's file holds."""
     try:
         with open_regular(path) as file:
             found = file.read(BYTES + 1)
@@ -39,11 +35,7 @@ def content(path: Path) -> bytes:
 
 
 def check_files(spec: Any, path: Path) -> None:
-    """Check every mesh of an MJCF file that is there: MuJoCo would wait for a pipe, and take any size.
-
-    Raises:
-        SceneError: naming the file.
-    """
+    """Check every mesh of an MJCF file that is there: MuJoCo would wait for a pipe, and take any size."""
     for _, file in _files(spec, path):
         if file.exists():
             content(file)
@@ -102,11 +94,7 @@ def _only_drawn(spec: Any, geom: Any, touching: set[str]) -> bool:
 
 
 def supplied(root: ElementTree.Element, path: Path) -> dict[str, bytes]:
-    """Return the meshes that a URDF names as MuJoCo's assets, and name them so there.
-
-    Raises:
-        SceneError: for a mesh that is not there or is in a format that nothing here reads.
-    """
+    """Return the meshes that a URDF names as MuJoCo's assets, and name them so there."""
     found: dict[str, bytes] = {}
     names: dict[Path, str] = {}
     for mesh in root.findall("link/collision/geometry/mesh"):
@@ -121,11 +109,7 @@ def supplied(root: ElementTree.Element, path: Path) -> dict[str, bytes]:
 
 
 def located(name: str, path: Path) -> Path:
-    """Return where a mesh is that a URDF names: beside it, or in a package above it for package://PACKAGE/...
-
-    Raises:
-        SceneError: naming the places that were tried.
-    """
+    """Return where a mesh is that a URDF names: beside it, or in a package above it for package://PACKAGE/..."""
     scheme, _, rest = name.rpartition("://")
     inside = Path(rest.lstrip("/") if scheme == "package" else rest)
     above = path.resolve().parents

@@ -43,10 +43,6 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     """Return MuJoCo's model of a file as it stands but for what has to be left out before it is compiled.
 
     With it what MuJoCo warns of, and which meshes are not there.
-
-    Raises:
-        SceneError: with MuJoCo's own sentence.
-        InvalidValue: for a pair of bodies that the file does not have.
     """
     import mujoco
 
@@ -73,11 +69,7 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
 
 
 def scene_of(model: mujoco.MjModel) -> Scene:
-    """Return the scene of a compiled model.
-
-    Raises:
-        SceneError: for what the scene cannot hold, by name.
-    """
+    """Return the scene of a compiled model."""
     check_understood(model)
     return Scene(
         bodies=tuple(_body(model, i) for i in range(1, model.nbody)),

@@ -26,12 +26,7 @@ HEAD = 4096
 
 
 def existing(path: Path) -> Path:
-    """Return the path of a robot file.
-
-    Raises:
-        NoFile: if it is not there.
-        InvalidValue: for another suffix, by which MuJoCo's compiler knows what it reads.
-    """
+    """Return the path of a robot file."""
     if not path.is_file():
         raise NoFile("robot file", path)
     if path.suffix not in SUFFIXES:
@@ -49,10 +44,6 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     """Return the compiled model whose tree, shapes and filters are the file's; inertias of a URDF are placeholders.
 
     With it sentences on what the compiler found strange.
-
-    Raises:
-        SceneError: with the compiler's own sentence.
-        InvalidValue: for a word in `without` that names nothing.
     """
     model, told = (urdf if is_urdf(path) else mjcf).read(path, without)
     strip(model, without)
@@ -65,11 +56,7 @@ def model_of(path: Path, without: str = "") -> mujoco.MjModel:
 
 
 def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
-    """Return the scene of a file by its model.
-
-    Raises:
-        SceneError: for what a scene does not have, by name.
-    """
+    """Return the scene of a file by its model."""
     scene = mjcf.scene_of(model)
     return urdf.with_inertias(path, scene) if is_urdf(path) else scene
 
@@ -84,12 +71,7 @@ BODIES = ("body", "link")
 
 
 def check_text(path: Path) -> None:
-    """Check a file and what it includes; what is no XML is left to the compiler, which names the line.
-
-    Raises:
-        SceneError: for more bodies than a scene may have, for an include from outside the folder,
-            for too many bytes.
-    """
+    """Check a file and what it includes; what is no XML is left to the compiler, which names the line."""
     _count(path, path.resolve().parent, {path.resolve()})
 
 

@@ -81,11 +81,7 @@ NOT_FELT = frozenset({"geom_fluid", "jnt_plasticadr", "tendon_plasticadr", "key_
 
 
 def check_understood(model: Any) -> None:
-    """Refuse a compiled model that holds physics which a scene does not.
-
-    Raises:
-        SceneError: naming the array and the parts that it belongs to.
-    """
+    """Refuse a compiled model that holds physics which a scene does not."""
     for name in dir(model):
         array = getattr(model, name) if name[0] != "_" else None
         if not isinstance(array, np.ndarray) or name in READ or name in DERIVED:

@@ -28,11 +28,7 @@ PLACEHOLDER = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="
 
 
 def parsed(path: Path) -> ElementTree.Element:
-    """Return the root of a URDF.
-
-    Raises:
-        SceneError: with the parser's own place.
-    """
+    """Return the root of a URDF."""
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
@@ -46,10 +42,6 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     """Return MuJoCo's model of the tree, with a placeholder for every inertia and without what is only drawn.
 
     With it what MuJoCo warns of, which else goes to the terminal at every reading.
-
-    Raises:
-        SceneError: with MuJoCo's own sentence, for a mesh that cannot be read, or a joint that mimics none.
-        InvalidValue: for a pair of bodies that the file does not have.
     """
     import mujoco
 
@@ -89,9 +81,6 @@ def _float(root: ElementTree.Element) -> None:
     """Let floating joints hang on the world itself, which the root is called then: the compiler knows none elsewhere.
 
     The root stands on the world anyway, and is no body of the scene then.
-
-    Raises:
-        SceneError: for one that floats on what another joint moves.
     """
     floating = [joint for joint in root.findall("joint") if joint.get("type") == "floating"]
     above = {_link(joint, "child"): joint for joint in root.findall("joint")}

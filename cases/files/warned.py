@@ -31,11 +31,7 @@ def captured() -> Iterator[list[str]]:
 
 
 def compiled(path: Path, compiler: Callable[[], Any]) -> tuple[Any, list[str]]:
-    """Return what a compiler makes of a file, and what MuJoCo warns of meanwhile.
-
-    Raises:
-        SceneError: with MuJoCo's own sentence, and for a number that is none.
-    """
+    """Return what a compiler makes of a file, and what MuJoCo warns of meanwhile."""
     with captured() as warned:
         try:
             found = compiler()

@@ -25,9 +25,6 @@ def apart(spec: Any, without: str) -> Any:
     Args:
         spec: MuJoCo's; it is changed.
         without: of `strip`; here count pair:BODY:BODY and overlaps: bodies that do so in the reference pose.
-
-    Raises:
-        InvalidValue: for a pair of bodies that there is not.
     """
     words = _words(without)
     bodies = {body.name for body in spec.bodies}
@@ -67,9 +64,6 @@ def strip(model: Any, without: str) -> None:
         model: MuJoCo's; it is changed.
         without: words separated by commas: one of `ALL`, kind:NAME of an actuator, loop or
             tendon, or what `apart` has done before.
-
-    Raises:
-        InvalidValue: for a word that names nothing.
     """
     for word in _words(without):
         kind, _, name = word.partition(":")

@@ -72,11 +72,7 @@ CONTACTS = ("left foot", "right foot", "left corner", "right corner", "wall")
 
 
 def start(p: Mapping[str, float]) -> tuple[Floats, Floats]:
-    """Positions and velocities (6,) at t = 0.
-
-    Raises:
-        SceneError: if a corner of the box is in the slab, beside it, or in the wall.
-    """
+    """Positions and velocities (6,) at t = 0."""
     a, b, d, th = p["half_width"], p["half_height"], p["slab_half_height"], p["tilt"]
     y = 2.0 * d + p["drop"] + a * abs(math.sin(th)) + b * math.cos(th)
     q = np.array([p["x"], y, th, 0.0, d + p["slab_height"], p["slab_tilt"]])

@@ -104,11 +104,7 @@ VARIANTS: dict[str, dict[str, Value]] = {"falls": {}}
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
-    """The scene with its exact motion, as far as it goes.
-
-    Raises:
-        InvalidValue: for a horizon behind the instant at which the block is flat.
-    """
+    """The scene with its exact motion, as far as it goes."""
     p = {name: float(value) for name, value in parameters.items()}
     if not p["t_end"] < (last := flat_at(p)):
         raise InvalidValue(f"rocking_block: t_end is {p['t_end']:g} s; the block is flat at {last:.6g} s.")

@@ -68,11 +68,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
 
 
 def _check_names(variant: str, parameters: Mapping[str, Value]) -> None:
-    """A parameter of the other variant would be ignored.
-
-    Raises:
-        InvalidValue: naming it.
-    """
+    """A parameter of the other variant would be ignored."""
     for name, parameter in _FOREIGN[variant].items():
         if parameters[name] != parameter.default:
             other = next(v for v in VARIANTS if v != variant)

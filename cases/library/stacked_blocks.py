@@ -53,11 +53,7 @@ _LIMITS = (
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
-    """The scene with its exact motion.
-
-    Raises:
-        InvalidValue: if both blocks are pushed.
-    """
+    """The scene with its exact motion."""
     p = {name: float(value) for name, value in parameters.items()}
     if p["push_low"] and p["push_high"]:
         raise InvalidValue("stacked_blocks: push_low and push_high are both given; valid: one of them.")

@@ -182,11 +182,7 @@ class SceneRun(Run):
         )  # fmt: skip
 
     def run(self) -> Trajectory:
-        """Integrate from the start.
-
-        Raises:
-            CaseUnsupported: where the motion reaches a row that the plant has not.
-        """
+        """Integrate from the start."""
         log, forces = Log(), self.applied.forces
         self.acting.reset()
         forces.begin(self.case.act0)

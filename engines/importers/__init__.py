@@ -299,12 +299,7 @@ def missing(absent: Sequence[str]) -> str:
 
 
 def known(wanted: Sequence[str]) -> tuple[str, ...]:
-    """Return the importers wanted, each once; all of them where none is.
-
-    Raises:
-        UnknownName: for one that there is not.
-        InvalidValue: for an engine that reads no robot files.
-    """
+    """Return the importers wanted, each once; all of them where none is."""
     for name in wanted:
         if name in WITHOUT and name not in names():
             raise InvalidValue(f"{name} has no reader of robot files of its own{WITHOUT[name]}.")

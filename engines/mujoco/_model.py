@@ -188,11 +188,7 @@ def build(
     case: Case, profile: str, dt: float, reader: str = "file", cone: str = "own", impratio: float = 0.0,
     noslip: int = -1, timeconst: float = 0.0,
 ) -> Prepared:  # fmt: skip
-    """Compile the model of one profile.
-
-    Raises:
-        ValueError: MuJoCo's own, for a model that it refuses.
-    """
+    """Compile the model of one profile."""
     integrated = followed(case, profile) or case
     scene = _scene(integrated)
     if profile == "as_is":

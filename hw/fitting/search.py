@@ -27,11 +27,7 @@ class Deadline:
         self.seconds, self._end = seconds, time.monotonic() + seconds
 
     def check(self) -> None:
-        """Go on, or stop.
-
-        Raises:
-            TimeOver: if the time is over.
-        """
+        """Go on, or stop."""
         if time.monotonic() > self._end:
             raise TimeOver
 

@@ -22,9 +22,6 @@ class Bounded:
         path: the log.
         reader: its reader; closed if it has too many columns.
         budget: what reading may cost.
-
-    Raises:
-        LogFormatError: for too many columns.
     """
 
     def __init__(self, path: Path, reader: Reader, budget: Budget) -> None:
@@ -169,9 +166,6 @@ class Chunks:
             compression: its name.
             raw: what stands in the file.
             declared: size that the file tells; None if it does not.
-
-        Raises:
-            LogFormatError: if it unfolds to another size, or to more than the budget.
         """
         if key in self._kept:
             return self._kept[key]

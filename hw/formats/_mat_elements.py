@@ -22,11 +22,7 @@ PIECE = 1 << 20  # bytes that are unfolded at a time
 
 
 def starts(path: Path) -> list[int]:
-    """Where each variable of a file begins, in the order of the file; reads tags only, each once.
-
-    Raises:
-        LogFormatError: if there are more than a log has columns.
-    """
+    """Where each variable of a file begins, in the order of the file; reads tags only, each once."""
     found, at, end = list[int](), HEADER, path.stat().st_size
     with path.open("rb") as file:
         order = _order(file.read(HEADER))
@@ -46,9 +42,6 @@ def described(path: Path, start: int) -> tuple[str, tuple[int, ...], str]:
     Args:
         path: the file.
         start: where the variable begins, of `starts`.
-
-    Raises:
-        LogFormatError: if these bytes are no beginning of a variable.
     """
     with path.open("rb") as file:
         order = _order(file.read(HEADER))
@@ -87,9 +80,6 @@ def whole_variable(path: Path, start: int, budget: Budget) -> io.BytesIO:
         path: the file.
         start: where the variable begins, of `starts`.
         budget: what it may unfold to.
-
-    Raises:
-        LogFormatError: if it unfolds to more than the budget, or its structs are nested without an end.
     """
     with path.open("rb") as file:
         header = file.read(HEADER)

@@ -89,11 +89,7 @@ def crowded(message: Any) -> str:
 
 
 def refuse_large(path: Path, topic: str, data: bytes) -> None:
-    """Refuse a message that is not decoded among ones that are.
-
-    Raises:
-        LogFormatError: if it is too large.
-    """
+    """Refuse a message that is not decoded among ones that are."""
     if why := too_large(data):
         raise LogFormatError(path, f"{topic!r} {why}.")
 
@@ -157,10 +153,6 @@ def rows_of(
         group: the topic's columns.
         leaves: where a message holds each.
         columns: the wanted ones.
-
-    Raises:
-        LogFormatError: at a message that lacks one of the columns, or if there are fewer messages
-            than announced.
     """
     types = {column.name: column.type for column in group.columns}
     row = 0

@@ -110,9 +110,6 @@ def sliced(
         group: whose rows.
         columns: the wanted ones.
         get: (name, start, stop) -> those rows of a column.
-
-    Raises:
-        LogFormatError: for what the parser raises, or a column that ends before its rows do.
     """
     for start, stop in spans(group.rows or 0):
         block: Block = {}

@@ -176,11 +176,7 @@ def _first_line(path: Path, options: Options) -> str:
 
 
 def _leave_out(path: Path, file: TextIO, count: int) -> None:
-    """Go past the lines before the header.
-
-    Raises:
-        LogFormatError: if the file ends before.
-    """
+    """Go past the lines before the header."""
     for line in range(count):
         if not file.readline(BLOCK_BYTES):
             raise LogFormatError(path, f"has {line} lines; `options.skip` leaves out {count}, and the header too.")

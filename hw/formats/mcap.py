@@ -104,11 +104,7 @@ class McapReader:
         return counts, first
 
     def _told(self) -> dict[str, int]:
-        """Messages of every topic by the file's summary; empty if it has none.
-
-        Raises:
-            LogFormatError: for chunks or messages in there: nothing is unfolded to be listed.
-        """
+        """Messages of every topic by the file's summary; empty if it has none."""
         from mcap.data_stream import ReadDataStream
         from mcap.records import Channel, Statistics
 
@@ -207,11 +203,7 @@ class McapReader:
 
 
 def records(file: Any, path: Path, budget: Budget, at: int = len(MAGIC)) -> Iterator[tuple[int, int, int]]:
-    """Place, opcode and length of the records of an open MCAP file from one on, each before its content is read.
-
-    Raises:
-        LogFormatError: for a record that reaches beyond the file, or a chunk that would unfold to too much.
-    """
+    """Place, opcode and length of the records of an open MCAP file from one on, each before its content is read."""
     end = file.seek(0, 2) - len(MAGIC)
     for number in itertools.count():
         if at + RECORD.size > end:

@@ -35,11 +35,7 @@ def open_log(path: Path, options: Options) -> RosbagReader:
 
 
 def check_bag(path: Path) -> None:
-    """Refuse a bag whose files would unfold to more than its budget, or whose tables compute what they show.
-
-    Raises:
-        LogFormatError: with what is wrong.
-    """
+    """Refuse a bag whose files would unfold to more than its budget, or whose tables compute what they show."""
     budget = current(path)
     files = sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]
     for file in files:

@@ -27,11 +27,7 @@ AXES = ("x", "y", "z")
 
 
 def state(robot: Robot, y: Floats, yd: Floats) -> tuple[Floats, Floats]:
-    """All nine angles and rates of the closed pose from those of the motors (3,).
-
-    Raises:
-        SceneError: if no pose has these motor angles.
-    """
+    """All nine angles and rates of the closed pose from those of the motors (3,)."""
     q = forward(robot, y)
     v = np.zeros(9)
     v[MOTORS], v[OTHERS] = yd, jacobians(robot, q)[2] @ yd

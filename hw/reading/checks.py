@@ -55,11 +55,7 @@ class Checks:
                 rate.see(block.rows, block.time, block.values[q], block.values[v])
 
     def refuse(self, path: Path) -> None:
-        """Raise the first fault that was found, if there is one.
-
-        Raises:
-            LogFormatError: with row, time and channel of its first offence.
-        """
+        """Raise the first fault that was found, if there is one."""
         for finding in self.findings():
             if finding.fault:
                 raise finding.error(path)

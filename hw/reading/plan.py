@@ -95,12 +95,7 @@ class Plan:
 
 
 def make_plan(path: Path, reader: Reader, columns: Columns) -> Plan:
-    """Find every signal of a map in an open log.
-
-    Raises:
-        LogFormatError: for a column that the file does not have, cannot be read as numbers or has
-            another unit than the map says.
-    """
+    """Find every signal of a map in an open log."""
     found = _Finder(path, reader)
     time = columns.time
     groups = [found.column(time.column)[0]] if time.column else []

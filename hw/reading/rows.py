@@ -43,9 +43,6 @@ def join(path: Path, how: str, time: Floats, other: Rows, column: str) -> tuple[
 
     Returns:
         The values (n,) of each signal, NaN where there are none, and the number of leading rows without any.
-
-    Raises:
-        LogFormatError: if times of the other rows do not increase, or, for "exact", differ from the log's.
     """
     back = np.flatnonzero(~(np.diff(other.time) > 0.0))
     if len(back):

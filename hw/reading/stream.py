@@ -107,12 +107,7 @@ class Stream:
 
 
 def collect(blocks: Iterable[Rows], plan: Plan, group: Group, limit: int) -> Rows:
-    """Join blocks up to `limit` bytes, filling arrays in place: little more than the result is ever in memory.
-
-    Raises:
-        LogFormatError: if there are no rows, or more than the limit admits; the announced number
-            is refused at once.
-    """
+    """Join blocks up to `limit` bytes, filling arrays in place: little more than the result is ever in memory."""
     announced = 0 if plan.columns.part else group.rows or 0
     held: tuple[NDArray[Any], ...] = ()
     size = 0

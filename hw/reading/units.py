@@ -53,10 +53,6 @@ def to_si(unit: str) -> Conversion:
 
     Args:
         unit: as people write it: "deg", "rpm", "N m", "m/s^2", "mm", "degC", "1".
-
-    Raises:
-        InvalidValue: if it is no unit.
-        FormatUnavailable: if pint is not installed.
     """
     try:
         return _convert(unit.strip())

@@ -36,11 +36,7 @@ def rows_at(system: System, q: Array, v: Array, p: Array) -> tuple[Array, Array,
 
 
 def closed_by(H: NDArray[Any], others: NDArray[np.int64], right: NDArray[Any]) -> NDArray[Any]:
-    """What the coordinates that are not measured must do so that rows close: the solution of H[:, others] x = right.
-
-    Raises:
-        SceneError: if the rows do not hold them, naming their rank and what is free.
-    """
+    """What the coordinates that are not measured must do so that rows close: the solution of H[:, others] x = right."""
     block = H[:, others]
     try:
         return np.linalg.solve(block, right)

@@ -104,9 +104,6 @@ def derivatives(
     Returns:
         value, rate, acceleration (m, k), and gain (m, 3): standard deviations of the three for
             unit white noise.
-
-    Raises:
-        InvalidValue: if there are too few samples for the polynomial.
     """
     n, width = len(t), 2 * half + 1
     if n < width or width <= degree + 2:

@@ -61,10 +61,6 @@ def windows(
         restart: time from one restart to the next, s; 0 for one window; the model's usual one if None.
         delay: of the measured coordinates beyond what the column map says, s.
         horizon: length of a window, s; up to the next restart if None. Longer ones overlap.
-
-    Raises:
-        SceneError: if the log lacks a coordinate, or a whole window.
-        InvalidValue: for a restart or a horizon outside its range.
     """
     model.check_log(log)
     length = model.restart if restart is None else arguments.real("restart", restart)
@@ -95,9 +91,6 @@ def recorded_inputs(log: Log, model: Model) -> Floats:
     """The inputs that drive a model (n, nu), in force from each of the log's times on.
 
     Their delays, which the column map tells, are taken off, to the next sample.
-
-    Raises:
-        SceneError: naming those that the log does not have.
     """
     if lacking := [name for name in model.inputs if name not in log.names("inputs")]:
         raise SceneError(f"The log has no input {', '.join(lacking)}, which {model.name} is driven by.")
@@ -180,11 +173,7 @@ def run_once(case: Case, solver: str, **options: Any) -> Trajectory:
 def run_window(
     model: Model, numbers: Mapping[str, Value], window: Window, name: str, profile: str, settings: Mapping[str, Any]
 ) -> tuple[Trajectory, dict[str, Any]]:
-    """One window on one engine: the motion, and what was really used.
-
-    Raises:
-        CaseUnsupported, EngineUnavailable: if the engine cannot do it.
-    """
+    """One window on one engine: the motion, and what was really used."""
     case = model.build(numbers, window.segment)
     asked = dict(model.settings.get(name, {})) | dict(settings)
     engine = engines.load(name)

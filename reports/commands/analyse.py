@@ -34,11 +34,7 @@ BESIDE = ["place", "engine", "way", "slope", "poles", "verdict"]
 
 
 def parse_range(text: str) -> tuple[str, list[float]]:
-    """PARAM=a..b as the parameter and its values.
-
-    Raises:
-        InvalidValue: for a text of another form.
-    """
+    """PARAM=a..b as the parameter and its values."""
     name, _, ends = text.partition("=")
     low, dots, high = ends.partition("..")
     try:
@@ -51,11 +47,7 @@ def parse_range(text: str) -> tuple[str, list[float]]:
 
 
 def parse_place(pairs: Sequence[str]) -> dict[str, float]:
-    """Where to look, from k=v.
-
-    Raises:
-        InvalidValue: for what is not a number.
-    """
+    """Where to look, from k=v."""
     found = choice.parse_settings(pairs, "--at")
     for name, value in found.items():
         if isinstance(value, str):
@@ -82,9 +74,6 @@ def analyse(
 
     Returns:
         1 if an engine's model is outside its limit without a known reason, else 0.
-
-    Raises:
-        CrossbodyError: for wrong use, before anything is written.
     """
     overrides, place = choice.parse_settings(pairs), parse_place(at)
     case = cases.load(name, variant, **overrides)
@@ -123,9 +112,6 @@ def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
         pairs: K=V, parameters of the case to change; k* is the figure's own.
         out: folder to write.
         command: what was typed, for provenance.
-
-    Raises:
-        CrossbodyError: for wrong use, before anything is written.
     """
     curves.check(name)
     parameters = choice.parse_settings(pairs)

@@ -56,9 +56,6 @@ def audit(ask: Ask) -> int:
 
     Returns:
         1 if a reader makes something else of the file or fails, else 0.
-
-    Raises:
-        CrossbodyError: for wrong use, a file that is none, engines none of which is there.
     """
     existing(ask.path)
     _check_out(ask)

@@ -64,11 +64,7 @@ def _larger(one: float, other: float) -> float:
 
 
 def main(names: list[str]) -> None:
-    """Run cases, all if none is named, one process a core, and store what they gave; each as soon as it is there.
-
-    Raises:
-        CrossbodyError: for a name that does not exist.
-    """
+    """Run cases, all if none is named, one process a core, and store what they gave; each as soon as it is there."""
     wanted = [(name, variant) for name in names or cases.names() for variant in cases.variants(name)]
     for found in Parallel(n_jobs=-1, return_as="generator_unordered")(delayed(_measured)(*one) for one in wanted):
         stored.write(found)

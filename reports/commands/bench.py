@@ -35,11 +35,7 @@ def run(
     repeats: int | None, full: bool, against: Path | None, command: str, limit: float = LIMIT,
     minutes: float | None = None,
 ) -> int:  # fmt: skip
-    """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code.
-
-    Raises:
-        CrossbodyError: for wrong use, before anything is run.
-    """
+    """Time engines against their error; writes tables and page, and compares with an earlier folder; the exit code."""
     cases, picks = scenes.chosen(names, variant, choice.parse_settings(pairs), full), scenes.picks(wanted)
     base = None if against is None else bench_against.read(against)
     if base is not None:
@@ -104,11 +100,7 @@ def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequen
 
 
 def alone(what: str, repeats: int | None, out: Path, command: str, limit: float = LIMIT, **asked: object) -> int:
-    """The table of what is skipped, or of the throughput of many runs; the exit code.
-
-    Raises:
-        InvalidValue: if something was asked for that these do not have: they have their own scenes.
-    """
+    """The table of what is skipped, or of the throughput of many runs; the exit code."""
     if any(asked.values()):
         raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
     output.check(out, what)

@@ -59,11 +59,7 @@ def show() -> int:
 
 
 def clear() -> int:
-    """Remove all compiled code; other files of the folder stay.
-
-    Raises:
-        OutputError: if some of it cannot be removed.
-    """
+    """Remove all compiled code; other files of the folder stay."""
     store = code_store.current()
     entries = store.entries() if store else []
     removed = store.clear() if store else 0

@@ -36,9 +36,6 @@ def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, co
 
     Returns:
         0: what engines do is no fault of the run.
-
-    Raises:
-        CrossbodyError: for wrong use.
     """
     wanted = importers.known(engines)
     if not (features := [feature for feature in FEATURES if part in feature.name]):

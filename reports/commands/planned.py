@@ -16,11 +16,7 @@ from crossbody.reports.runs import choice
 def tell(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], settings: Sequence[str]
 ) -> int:
-    """Print what `run` would do with the same words; the exit code.
-
-    Raises:
-        CrossbodyError: for wrong use, as `run` does.
-    """
+    """Print what `run` would do with the same words; the exit code."""
     cases = choice.load_cases(names, variant, choice.parse_settings(pairs))
     picks, asked = choice.picks(wanted), choice.parse_settings(settings, "--set-engine")
     choice.check_asked(asked, picks)

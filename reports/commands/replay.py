@@ -76,9 +76,6 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
         out: folder to write.
         command: what was typed, for provenance.
         limit: time after which an engine that has not come back is ended with its process, s.
-
-    Raises:
-        CrossbodyError: for wrong use, before anything is written.
     """
     hw.models.load(ask.model)
     output.check(out, "replay")
@@ -135,9 +132,6 @@ def run_identify(
         out: folder to write.
         command: what was typed, for provenance.
         limit: time after which it is stopped, s; its process is ended where it does not stop then.
-
-    Raises:
-        CrossbodyError: for wrong use, before anything is written.
     """
     model = hw.models.load(ask.model)
     output.check(out, "identify")

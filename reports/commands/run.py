@@ -40,9 +40,6 @@ def run(
     the time that an engine may take for one case, s; `strict` makes a number wrong that left its
     regression band; `at_once` is how many cases are run at once, in processes of their own;
     `budget` is how long the tightest run of a scene may take, s.
-
-    Raises:
-        CrossbodyError: for wrong use, before anything is written.
     """
     if rtol is not None and not 1e-14 <= rtol <= 1e-1:
         raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")

@@ -45,11 +45,7 @@ class Ask:
 
 
 def stress(ask: Ask, out: Path, command: str) -> int:
-    """Run suites, or what is left of them; the exit code.
-
-    Raises:
-        CrossbodyError: for wrong use, before anything is run.
-    """
+    """Run suites, or what is left of them; the exit code."""
     specs = plan(ask)
     chunk = min(max(len(specs) // CHUNKS, LEAST), MOST)
     if ask.resume and not (out / SWEEP).is_file():
@@ -72,12 +68,7 @@ def stress(ask: Ask, out: Path, command: str) -> int:
 
 
 def plan(ask: Ask) -> list[Spec]:
-    """Every run that is asked for.
-
-    Raises:
-        UnknownName, InvalidValue: for a suite, an engine or a number that does not exist; grids
-            that contradict.
-    """
+    """Every run that is asked for."""
     if ask.runs is not None and ask.runs < 1:
         raise InvalidValue(f"--runs is {ask.runs}; a sweep needs at least 1.")
     names = list(dict.fromkeys(ask.names or suites.names()))

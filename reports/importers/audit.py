@@ -70,9 +70,6 @@ def audited(
         without: what is left out of the yardstick, as of a case.
         seconds: what an importer may take.
         audit: of the file, where what it says is known already.
-
-    Raises:
-        SceneError: for a file that cannot be the yardstick, before any importer is asked.
     """
     check_text(path)
     left_out = _left_out(path, without)
@@ -140,9 +137,6 @@ def opened(path: Path, without: str = "", job: dict[str, Any] | None = None) -> 
         path: of the file.
         without: what is left out.
         job: states that are to be taken, where the file has its joints.
-
-    Raises:
-        SceneError: with what stands against it.
     """
     model, told = read(path, without)
     scene = scene_of(path, model)

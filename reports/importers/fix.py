@@ -93,11 +93,7 @@ MARK = "Written by the option fix of crossbody audit"
 
 
 def fixed(path: Path, out: Path, without: str = "") -> None:
-    """Write a file that means the same in plainer words.
-
-    Raises:
-        SceneError: for what is not rewritten, or would not mean the same; nothing is written then.
-    """
+    """Write a file that means the same in plainer words."""
     before = opened(path, without)
     root = urdf(path, out) if is_urdf(path) else mjcf(path, out)
     root.insert(0, ElementTree.Comment(f" {MARK} "))

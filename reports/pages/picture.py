@@ -42,9 +42,6 @@ class Film:
     Args:
         trace: the motion.
         i: its place among those of its case, which decides its colour.
-
-    Raises:
-        InvalidValue: if its mechanism has no picture.
     """
 
     def __init__(self, trace: Trace, i: int = 0) -> None:
@@ -226,11 +223,7 @@ def svg(strokes: Sequence[Stroke]) -> str:
 
 
 def raster(strokes: Sequence[Stroke]) -> Any:
-    """An image of Pillow of one instant, drawn twice as large and made smaller, so that edges are smooth.
-
-    Raises:
-        InvalidValue: if Pillow is not installed.
-    """
+    """An image of Pillow of one instant, drawn twice as large and made smaller, so that edges are smooth."""
     try:
         from PIL import Image, ImageDraw
     except ImportError:
@@ -254,9 +247,6 @@ def write(film: Film, path: Path, t: float, fps: float, speed: float) -> None:
         t: instant, s.
         fps: pictures a second of a GIF.
         speed: seconds of the motion in one of a GIF.
-
-    Raises:
-        InvalidValue: for another kind of file, or an instant that the motion does not have.
     """
     end = float(film.t[-1])
     if path.suffix not in SUFFIXES:

@@ -80,11 +80,7 @@ class Results:
 
 
 def read(out: Path, against: Path | None = None) -> Results:
-    """Read the tables of a folder and find its motions.
-
-    Raises:
-        OutputError: if a folder does not hold results that this version can read.
-    """
+    """Read the tables of a folder and find its motions."""
     told = read_json(out / "provenance.json")
     if not isinstance(told.get("versions", {}), dict):
         raise OutputError(f"{out / 'provenance.json'}: versions is not an object.")
@@ -102,11 +98,7 @@ def read(out: Path, against: Path | None = None) -> Results:
 
 
 def verdicts_of(out: Path) -> list[Row]:
-    """Verdicts of a folder, with the case's label and the engine's as columns of their own.
-
-    Raises:
-        OutputError: if it does not hold verdicts that this version can read.
-    """
+    """Verdicts of a folder, with the case's label and the engine's as columns of their own."""
     if out.is_dir() and not is_staged(out):
         recover(out)
     table = read_json(out / "verdicts.json")
@@ -175,9 +167,6 @@ def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
         out: the folder.
         case: case:variant; the first if empty.
         engine: engine or engine:profile; "truth" for the truth.
-
-    Raises:
-        InvalidValue: if there is none; the message lists those that there are.
     """
     found = _cases(out, verdicts_of(out))[0]
     mine = next((one for one in found if one.paths and case in ("", one.label)), None)

@@ -28,11 +28,7 @@ FULL = 2.25  # cases whose plots have their usual room in a single file; those o
 
 
 def check(against: Path | None, others: Sequence[Path]) -> None:
-    """Say before anything is computed whether the folders to be shown beside can be read.
-
-    Raises:
-        OutputError: if they cannot.
-    """
+    """Say before anything is computed whether the folders to be shown beside can be read."""
     if against is not None:
         verdicts_of(against)
     for other in others:
@@ -51,9 +47,6 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
 
     Returns:
         The index page.
-
-    Raises:
-        OutputError: if a folder does not hold results, or cannot be written.
     """
     if output.is_staged(out):
         _make(out, single_file, against, others)
@@ -84,11 +77,7 @@ _BROKEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, Arithmet
 
 
 def _rendered(found: Results, single_file: bool) -> Iterator[tuple[str, str]]:
-    """Name and text of every page, made one after another.
-
-    Raises:
-        OutputError: if a table or a motion is not what a page can show.
-    """
+    """Name and text of every page, made one after another."""
     try:
         links = _links(found)
         if single_file:

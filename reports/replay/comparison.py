@@ -28,11 +28,7 @@ FAILED = "A run that ends early predicts nothing after its end."
 
 
 def parse(pairs: Sequence[str]) -> tuple[Limit, ...]:
-    """Limits from NAME=VALUE.
-
-    Raises:
-        InvalidValue: for a text that is no such pair, or a value that is not at least 0 and finite.
-    """
+    """Limits from NAME=VALUE."""
     return tuple(_parsed(pair) for pair in pairs)
 
 

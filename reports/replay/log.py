@@ -29,9 +29,6 @@ def info(path: Path, columns: str | None, part: int | None, draft_only: bool, me
         part: number of the run, where the map tells several apart.
         draft_only: whether to print the drafted map and nothing else.
         memory: that reading may take over the file's own size, MB.
-
-    Raises:
-        CrossbodyError: if the log cannot be read, or a check refuses it (after everything else was printed).
     """
     room = memory * 1_000_000
     found = hw.survey(path, columns, memory=room)

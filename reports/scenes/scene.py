@@ -69,11 +69,7 @@ FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 
 
 def stage(p: Parameters) -> Stage:
-    """Return what is drawn of every body.
-
-    Raises:
-        ValueError: if these are more than anybody can see.
-    """
+    """Return what is drawn of every body."""
     scene = _scene(p)
     if len(scene.bodies) > MOST:
         raise ValueError(f"it has {len(scene.bodies)} bodies, and at most {MOST} are drawn")

@@ -38,11 +38,6 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
     Args:
         name: which.
         fixed: parameters of a case that is a file, the same in every run.
-
-    Raises:
-        UnknownName: if there is none; the message lists the names.
-        InvalidValue: if its axes contradict each other, or parameters are given to a suite that has its own.
-        SceneError: if a file defines neither SUITE nor a case.
     """
     from crossbody.cases.files.reading import SUFFIXES
 

@@ -26,9 +26,6 @@ def suite_of(name: str, fixed: Mapping[str, Value]) -> Suite:
     Args:
         name: path of the file.
         fixed: parameters that are the same in every run.
-
-    Raises:
-        UnknownName, SceneError, InvalidValue: where the case itself cannot be built.
     """
     families = []
     for variant in cases.variants(name)[:VARIANTS]:

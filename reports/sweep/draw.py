@@ -38,12 +38,7 @@ class Scene:
 
 
 def check(name: str, suite: Suite) -> None:
-    """Say before anything runs whether a suite's families can be built.
-
-    Raises:
-        UnknownName: for a case, a variant or a parameter that does not exist.
-        InvalidValue: for a level outside what its parameter admits.
-    """
+    """Say before anything runs whether a suite's families can be built."""
     for family in suite.families:
         source = module(family.case)
         if family.variant not in source.VARIANTS:
@@ -106,9 +101,6 @@ def specs(
         runs: of the first engine over all suites, shared as their own numbers are; these, if not given.
         seed: of the sweep.
         share: whether the engines behind the first make one run in `SHARE` only.
-
-    Raises:
-        InvalidValue: for fewer runs than 1.
     """
     if runs is not None and runs < 1:
         raise InvalidValue(f"--runs is {runs}; a sweep needs at least 1.")

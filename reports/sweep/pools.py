@@ -186,11 +186,7 @@ class Tls:
     key: str = ""
 
     def security(self) -> Any:
-        """What distributed wants of it; None where nothing is given.
-
-        Raises:
-            InvalidValue: if one of `ca` and `cert` is missing, or a file cannot be read as what it should be.
-        """
+        """What distributed wants of it; None where nothing is given."""
         if self == Tls():
             return None
         if not (self.ca and self.cert):
@@ -214,10 +210,6 @@ def connect(address: str, tls: Tls | None = None) -> Any:
     Args:
         address: tcp://HOST:PORT, or tls://HOST:PORT with `tls`.
         tls: who both ends are; without it the connection is neither encrypted nor authenticated.
-
-    Raises:
-        SchedulerUnavailable: if the package is not installed, or nothing answers at the address in time.
-        InvalidValue: if the files of `tls` cannot be used.
     """
     try:
         from distributed import Client

@@ -35,11 +35,7 @@ def identity(specs: Sequence[Spec], chunk: int, about: Mapping[str, Any]) -> dic
 
 
 class Store:
-    """The folder of one sweep.
-
-    Raises:
-        OutputError: if the folder cannot be written, or holds another sweep or somebody else's files.
-    """
+    """The folder of one sweep."""
 
     def __init__(self, path: Path, about: Mapping[str, Any]) -> None:
         self.path, self.about = path, dict(about)

@@ -63,11 +63,7 @@ class Row:
 
 
 def masses(parameters: Mapping[str, Value]) -> Floats:
-    """Mass of each ball (n,), kg.
-
-    Raises:
-        InvalidValue: if neither one nor n are listed.
-    """
+    """Mass of each ball (n,), kg."""
     return spread("newtons_cradle: masses", parameters["masses"], int(parameters["n"]))
 
 
@@ -77,9 +73,6 @@ def row(parameters: Mapping[str, Value], mechanism: str) -> Row:
     Args:
         parameters: of the case.
         mechanism: "sliders", or "pendulums", whose balls fall from `angle` to the bottom.
-
-    Raises:
-        InvalidValue, SceneError: for masses of another count, overlapping balls, or none that could be hit.
     """
     n, lifted, gap = int(parameters["n"]), int(parameters["lifted"]), float(parameters["gap"])
     if gap < 0.0:

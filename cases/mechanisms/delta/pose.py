@@ -31,11 +31,7 @@ def _rotations(sign: float) -> Floats:
 
 
 def pose(p: Numbers, z: Floats) -> Floats:
-    """Angles (9,) that bring the flange to z (3,), m, with the elbows outward.
-
-    Raises:
-        InvalidValue: naming each arm that cannot reach, and what it spans.
-    """
+    """Angles (9,) that bring the flange to z (3,), m, with the elbows outward."""
     local = rotations(p).transpose(0, 2, 1) @ z
     faults = [f"arm {i} {fault}" for i, own in enumerate(local, 1) if (fault := _fault(p, own))]
     if faults:
@@ -84,11 +80,7 @@ def flanges(p: Numbers, q: Floats) -> Floats:
 
 
 def symmetric_pose(p: Numbers, y: float) -> Floats:
-    """Angles (9,) with all motors at y, rad, and the flange on the axis below the elbows.
-
-    Raises:
-        InvalidValue: if the distal links are too short for it.
-    """
+    """Angles (9,) with all motors at y, rad, and the flange on the axis below the elbows."""
     aside = _offset(p) + p["l1"] * math.cos(y)
     if not abs(aside) < p["l2"]:
         raise InvalidValue(f"No symmetric pose at {y:g} rad: the elbows are {abs(aside):g} m off the axis.")
@@ -150,11 +142,7 @@ def kicked(p: Numbers, q: Floats, impulse: Floats) -> Floats:
 
 
 def elbow_angle(p: Numbers) -> float:
-    """The motor angle y* at which the elbows coincide, rad: R + l1 cos y* = 0.
-
-    Raises:
-        InvalidValue: if the proximal links are too short for that.
-    """
+    """The motor angle y* at which the elbows coincide, rad: R + l1 cos y* = 0."""
     if _offset(p) > p["l1"]:
         raise InvalidValue(f"The elbows never meet: l1 = {p['l1']:g} m is less than {_offset(p):g} m.")
     return math.acos(-_offset(p) / p["l1"])

@@ -26,11 +26,7 @@ FAR, FAST = (1.0, 1e-3, 1e-3, 1.0), (1.0, 1e-1, 1e-1, 1.0)
 
 
 def in_plane(case: Case, powered: bool = True, steady: bool = False) -> Form:
-    """Return the rings and the ball, in the case's coordinates.
-
-    Raises:
-        CaseUnsupported: with a sampled controller, which is no function of the state.
-    """
+    """Return the rings and the ball, in the case's coordinates."""
     if case.parameters["controller"] == "sampled":
         raise CaseUnsupported(ONLY_CONTINUOUS)
     p, maze = case.parameters, maze_of(case.parameters)

@@ -109,12 +109,7 @@ def parameters() -> dict[str, Parameter]:
 
 
 def maze_of(p: Mapping[str, Value]) -> Maze:
-    """The maze of a scene, checked.
-
-    Raises:
-        InvalidValue: for rings that overlap, gaps that cover a ring, or a ball that fits into no
-            channel or gap.
-    """
+    """The maze of a scene, checked."""
     count = int(p["rings"])
     rings = [_ring(p, i) for i in range(min(count, TABLE))]
     wall = float(p["wall"]) if count >= TABLE else _ring(p, count).inner
@@ -197,11 +192,7 @@ def _check_passages(maze: Maze) -> None:
 
 
 def start(maze: Maze, p: Mapping[str, Value]) -> tuple[float, float]:
-    """Ball centre on the face where it starts, m: it touches, at rest.
-
-    Raises:
-        InvalidValue: if there is no such ring.
-    """
+    """Ball centre on the face where it starts, m: it touches, at rest."""
     i, angle = int(p["ring"]), float(p["angle"])
     if i >= len(maze.rings):
         raise InvalidValue(f"ball_maze: ring is {i}; valid: 0 to {len(maze.rings) - 1}.")

@@ -60,11 +60,7 @@ CONTACTS = (*robot.LOOPS, "left", "right", "table")
 
 
 def check(p: Mapping[str, float]) -> None:
-    """Check the flange's path.
-
-    Raises:
-        InvalidValue: if it rises before it has come down.
-    """
+    """Check the flange's path."""
     if p["rise"] < p["descent"]:
         raise InvalidValue(
             f"soft_contact: rise is {p['rise']:g} s; the flange comes down until descent = "
@@ -73,11 +69,7 @@ def check(p: Mapping[str, float]) -> None:
 
 
 def start(p: Mapping[str, float]) -> Floats:
-    """Positions (18,): flange high on the axis, jaws open, block on the table.
-
-    Raises:
-        InvalidValue: if the robot cannot reach both depths.
-    """
+    """Positions (18,): flange high on the axis, jaws open, block on the table."""
     pose.pose(p, np.array([0.0, 0.0, p["low"]]))
     arms = pose.pose(p, np.array([0.0, 0.0, p["high"]]))
     half = 0.5 * p["width"]

@@ -69,12 +69,7 @@ def numbers(parameters: Mapping[str, Value]) -> dict[str, float]:
 
 
 def check(p: Mapping[str, float]) -> None:
-    """Check what single bounds cannot.
-
-    Raises:
-        InvalidValue: if the jaws close or open before they may.
-        SceneError: if a finger starts inside the block.
-    """
+    """Check what single bounds cannot."""
     if not p["close_end"] > p["close_start"]:
         raise InvalidValue(
             f"soft_contact: close_end is {p['close_end']:g} s; the jaws begin to close at "
