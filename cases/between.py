@@ -15,9 +15,7 @@ from crossbody.cases.trajectory import Trajectory
 def pieces(starts: Floats, t: Floats) -> NDArray[np.intp]:
     """Index of the piece of each time (n,): before an end, and behind it if the time stands again.
 
-    Args:
-        starts: where the pieces begin, s, nondecreasing.
-        t: nondecreasing times (n,), s.
+    Times are nondecreasing, as are the `starts` of pieces, s.
     """
     again = np.concatenate(([False], t[1:] == t[:-1]))
     before = np.searchsorted(starts, t, side="left") - 1

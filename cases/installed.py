@@ -152,10 +152,8 @@ def _knowing(files: Iterable[str], function: Callable[..., _Made], *given: Any) 
 def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
     """Import a file of a user's own.
 
-    Args:
-        kind: what it holds, for example "case", "plugin" or "controller".
-        path: of the file.
-        known: names that would be valid in its place.
+    Messages say what `kind` it is ("case", "plugin", "controller") and what `known` names stand in
+    its place.
     """
     spec = importlib.util.spec_from_file_location(f"crossbody_{kind}_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():

@@ -84,10 +84,8 @@ def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Cas
 def named(made: object, label: str, numbers: Mapping[str, Value]) -> Case:
     """Return what a file's `build` has made as a case: a scene starts at rest in its reference pose.
 
-    Args:
-        made: a case, or a scene.
-        label: CASE:VARIANT, the name of a case that has none.
-        numbers: the parameters; t_end is a scene's horizon, s.
+    The label CASE:VARIANT names a case that has no name; t_end of the numbers is a scene's horizon,
+    s.
     """
     if isinstance(made, Scene):
         made = case_of(made, t_end=float(numbers.get("t_end", 1.0)))

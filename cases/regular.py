@@ -12,10 +12,8 @@ from typing import BinaryIO
 def open_regular(path: str | Path, flags: int = 0, folder: int | None = None) -> BinaryIO:
     """Open a regular file for reading; a pipe, which would wait for a writer, and a device are refused.
 
-    Args:
-        path: the file.
-        flags: of `os.open`, beside reading.
-        folder: descriptor of the folder that the path is relative to.
+    Flags are of `os.open`, beside reading; the path is relative to the folder whose descriptor is
+    given.
     """
     never_wait = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_CLOEXEC", 0)
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0) | never_wait | flags, dir_fd=folder)

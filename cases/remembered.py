@@ -11,12 +11,10 @@ _Asked = TypeVar("_Asked", bound=Callable[..., Any])
 
 
 def remembered(count: int) -> Callable[[_Asked], _Asked]:
-    """Return a decorator that keeps the last answers of a function of frozen objects, told apart by what they are.
+    """Return a decorator that keeps so many last answers of a function of frozen objects.
 
-    Two objects that are equal are two: arrays are not compared. Answers are shared, so nobody may change one.
-
-    Args:
-        count: answers that are kept, with what they were asked for.
+    Two objects that are equal are two: arrays are not compared. Answers are shared, so nobody may
+    change one.
     """
 
     def decorate(function: _Asked) -> _Asked:

@@ -12,9 +12,7 @@ from crossbody.cases.arrays import Floats
 def normalised(q: Floats, quaternions: Sequence[int]) -> Floats:
     """Return positions (..., nq) with quaternions of length 1; one that is zero becomes NaN.
 
-    Args:
-        q: positions.
-        quaternions: first index in q of each.
+    `quaternions` has the first index in q of each, here and in what follows.
     """
     found = np.array(q, dtype=np.float64)
     for at in quaternions:
@@ -47,12 +45,7 @@ def rates(q: Floats, v: Floats, quaternions: Sequence[int]) -> Floats:
 
 
 def ways(q: Floats, quaternions: Sequence[int]) -> Floats:
-    """Return what positions move by from each to the next (n - 1, nv); a quaternion by a rotation vector in body axes.
-
-    Args:
-        q: positions (n, nq).
-        quaternions: first index in q of each.
-    """
+    """Return what positions move by from each to the next (n - 1, nv), a quaternion's in body axes."""
     moved, parts, at = np.diff(q, axis=0), [], 0
     for first in quaternions:
         turn = q[:, first : first + 4]

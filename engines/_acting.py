@@ -91,13 +91,7 @@ class Acting:
             self.controller = self.case.control.begin(self.values.shape[1])
 
     def at(self, t: float, q: Floats, v: Floats) -> Floats:
-        """Return the inputs (nu,) from one of the instants on.
-
-        Args:
-            t: the instant, s.
-            q: positions (nq,) there in the case's coordinates.
-            v: velocities (nv,).
-        """
+        """Return the inputs (nu,) from the instant t, s, on; q and v are those of the case there."""
         total = np.zeros(self.values.shape[1]) if self.case.inputs is None else self.case.inputs.at(t)
         if self.controller is not None:
             total += self.controller(t, q, v) if t in self.ticks else self.controller.u

@@ -429,12 +429,7 @@ def drift(rates: Callable[[Floats], Floats], v: Floats, turn: float = TURN) -> F
 
 
 def closing(met: Touches, velocity: Callable[[Indices, Floats], Any]) -> Floats:
-    """Return the rate of every gap (..., n), m/s.
-
-    Args:
-        met: where shapes may meet.
-        velocity: numbers of bodies, and points in the world (..., n, 3) -> how fast the bodies carry them.
-    """
+    """Return the rate of every gap (..., n), m/s, by how fast bodies carry points of the world."""
     apart = velocity(met.second, met.point) - velocity(met.first, met.point)
     total: Floats = np.einsum("...ni,...ni->...n", met.normal, apart)
     return total

@@ -150,13 +150,7 @@ def _in_case(form: Form, found: Mapping[str, Any]) -> dict[str, Any]:
 def linearised(
     case: Case, spot: Spot, linearise: Callable[[Case, Spot], tuple[Tangent, ...]]
 ) -> tuple[Tangent, ...]:  # fmt: skip
-    """Return what an engine makes of an equilibrium of a form, in the case's coordinates.
-
-    Args:
-        case: with a form.
-        spot: the equilibrium, in its coordinates.
-        linearise: of the engine.
-    """
+    """Return what an engine makes of an equilibrium of a form, in the case's coordinates."""
     if len(spot.u):
         names = tuple(f"u[{i}]" for i in range(len(spot.u))) if case.inputs is None else case.inputs.names
         case = replace(case, inputs=Inputs(names=names, times=np.zeros(1), values=spot.u[None]))

@@ -76,13 +76,7 @@ def sampled(
 ) -> Trajectory:  # fmt: skip
     """The motion from the steps of an adaptive integrator, with touches and releases put in.
 
-    Args:
-        line: the scene.
-        t: ends of the steps (n,), s.
-        q: positions there (n, nb).
-        v: velocities there.
-        lam: multipliers there (n, nc), N.
-        more: wall_s, steps, outcome and message, as in `Trajectory`.
+    At ends of steps t (n,): q and v (n, nb) and lam (n, nc), N; `more` is as in `Trajectory`.
     """
     at, new, rows = _crossings(line, t, q, v)
     h = line.gaps(q)
@@ -271,15 +265,9 @@ def settings(case: Case, scene: Line, step: float) -> Mapping[str, Parameter]:
 def stepped(
     who: tuple[str, str], case: Case, used: Mapping[str, Any], stepper: Stepper, masses: list[float], gravity: float
 ) -> PeerRun:
-    """A prepared run with what reached the engine: in the audit a restitution stands where the law has constants.
+    """A prepared run with what reached the engine: a restitution stands where the law has constants.
 
-    Args:
-        who: engine and profile.
-        case: the scene.
-        used: the values of `settings`.
-        stepper: the engine's world.
-        masses: read back from it, kg.
-        gravity: read back from it, m/s^2.
+    `who` are engine and profile; masses, kg, and gravity, m/s^2, are read back from the engine.
     """
     integrate = Steps(
         stepper=stepper, line=stepper.scene, t_end=case.t_end, dt=float(used["dt"]), max_steps=int(used["max_steps"])

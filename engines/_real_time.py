@@ -24,10 +24,7 @@ def one_set(law: Law) -> Law:
 def in_real_time(case: Case, fsm: str = "level", *, two_sets: bool = False) -> Case:
     """Return the scene with every contact integrated in real time, all together, under the machine `fsm`.
 
-    Args:
-        case: the scene.
-        fsm: the machine.
-        two_sets: whether a row that is captured is handed over to constants of its own.
+    With two sets a row that is captured is handed over to constants of its own.
     """
     law = case.law if case.real_time is None else case.real_time
     law = law if two_sets else one_set(law)
@@ -37,9 +34,7 @@ def in_real_time(case: Case, fsm: str = "level", *, two_sets: bool = False) -> C
 def followed(case: Case, *, two_sets: bool = False) -> Case | None:
     """Return what an engine with the level machine follows instead of a case; None where it is the case.
 
-    Args:
-        case: the scene.
-        two_sets: whether it knows COLLISION and hands over to CONTACT, as the rule `resolved` has it.
+    With two sets it knows COLLISION and hands over to CONTACT, as the rule `resolved` has it.
     """
     quick = bool((case.law.b0 > 0.0).any())
     same = case.fsm == "level" and (not quick or (two_sets and case.collisions == "resolved"))

@@ -66,11 +66,9 @@ def places(scene: Scene) -> tuple[dict[str, int], dict[str, int]]:
 
 
 def masses(scene: Scene, of_bodies: Mapping[str, float] | None = None) -> Floats:
-    """Return the mass, kg, of each body that a joint moves, with those that are fixed to it; the world's is left out.
+    """Return the mass, kg, of each body that a joint moves, with those that are fixed to it.
 
-    Args:
-        scene: with the bodies.
-        of_bodies: their masses, as an engine has them; the scene's own if not given.
+    The world's is left out. Bodies have the masses that an engine has of them, or the scene's own.
     """
     moved, to, total = {joint.body for joint in scene.joints}, {"": ""}, dict[str, float]()
     for body in scene.bodies:

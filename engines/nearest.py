@@ -53,12 +53,7 @@ def meet(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Pos
 def lying(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Pose, sine: Floats) -> Truths:
     """Return whether capsules lie along each other, or cylinders stand on their plane (...).
 
-    Args:
-        kinds: types of the first and of the second shapes.
-        sizes: of both (..., 3).
-        at: poses of the first shapes.
-        by: poses of the second shapes.
-        sine: of the angle up to which they do (...); 0 of other shapes, which never do.
+    They do up to an angle of that sine; 0 of other shapes, which never do.
     """
     if kinds == ("plane", "cylinder"):
         return np.asarray(tilt(at, by) <= sine)

@@ -23,11 +23,7 @@ def everything() -> Named:
 
 
 def case(name: str) -> Named:
-    """Return variants, parameters, rows and own metrics of a case.
-
-    Args:
-        name: of a case, or the path of a file with one.
-    """
+    """Return variants, parameters, rows and own metrics of a case."""
     from crossbody import cases
     from crossbody.cases import loading
 

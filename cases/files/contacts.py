@@ -31,11 +31,7 @@ class Meeting(NamedTuple):
 def meeting(case: Case, t: Floats, q: Floats, v: Floats) -> Meeting | None:
     """Return the first of shapes of a file whose contacts no row stands for, if they meet.
 
-    Args:
-        case: of a file.
-        t: instants (n,), s.
-        q: positions there (n, nq).
-        v: velocities there (n, nv).
+    Positions (n, nq) and velocities (n, nv) are those at the instants t (n,), s.
     """
     model = model_of(Path(case.file), str(case.parameters.get("without", "")))
     pairs = () if case.scene is None else (*(one.pair for one in contacts(case.scene)), *inert(case.scene))
@@ -48,13 +44,8 @@ def _first(
 ) -> Meeting | None:
     """Return the first instant at which two shapes come within reach, and a sentence on it; None if none do.
 
-    Args:
-        model: MuJoCo's, which knows the file's filters.
-        t: instants (n,), s.
-        q: positions there (n, nq).
-        v: velocities there (n, nv).
-        known: pairs of shapes that have rows.
-        rubs: of pairs that have none because of their friction what is wrong with it.
+    `known` are pairs of shapes that have rows; `rubs` says of those that have none because of their
+    friction what is wrong with it.
     """
     import mujoco
 

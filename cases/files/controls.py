@@ -27,9 +27,7 @@ LARGEST = 1 << 28  # bytes in memory: an hour of eight actuators at 1 kHz
 def read_controls(path: Path, scene: Scene) -> Inputs:
     """Return what a table says, each row held until the next.
 
-    Args:
-        path: a CSV or Parquet table with a head, or an NPZ with t (m,) and ctrl (m, nu).
-        scene: whose actuators they are.
+    A CSV or Parquet table has a head, an NPZ t (m,) and ctrl (m, nu).
     """
     names = [actuator.name for actuator in scene.actuators]
     if not path.is_file():
@@ -121,10 +119,7 @@ def under(case: Case, control: Control) -> Case:
 def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Inputs | None]:
     """Return a scene with pushes, and what acts on it with them.
 
-    Args:
-        scene: without pushes.
-        inputs: its controls.
-        text: BODY FX FY FZ T0 T1, in N and s, of every push; they are parted by a semicolon.
+    The text has BODY FX FY FZ T0 T1, in N and s, of every push, parted by semicolons.
     """
     if not (given := [_push(part, scene) for part in text.split(";") if part.strip()]):
         return scene, inputs

@@ -18,13 +18,7 @@ SMALLEST = 1e-15  # weights below it count as none
 
 
 def pairs_of(model: Any, name: Callable[[int], str], law: Callable[[Any, Any, Any], RowLaw]) -> tuple[Pair, ...]:
-    """Return the pairs of a compiled model.
-
-    Args:
-        model: MuJoCo's.
-        name: shape's number -> its name.
-        law: model, solref, solimp -> the law of a row.
-    """
+    """Return the pairs of a compiled model; `law` makes that of a row from the model, solref and solimp."""
     _check_fields(model, name)
     given = [_explicit(model, i, name, law) for i in range(model.npair)]
     listed = {frozenset(pair) for pair in _listed(model)}

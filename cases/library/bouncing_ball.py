@@ -76,10 +76,7 @@ _FIXED_STEP = {"position": 1e-6, "energy_drift": 2e-5, "lam_impulse": 1e-6, "lam
 def limits(claims: Iterable[Claim], bilateral: bool, height: float) -> tuple[Limit, ...]:
     """The limits of one variant beside those that every case has: its claims, and the properties of engines.
 
-    Args:
-        claims: what it claims.
-        bilateral: whether the floor is always on.
-        height: of the ball at the start, m.
+    `bilateral` says whether the floor is always on; the ball starts at `height`, m.
     """
     claimed = {claim.metric for claim in claims}
     wanted = ERRORS | {metric: CLAIMS[metric] for metric in CLAIMS if metric in claimed}

@@ -37,12 +37,9 @@ class Drift:
         self.row = np.repeat(np.arange(model.ntendon), model.ten_J_rownnz)  # of each entry of the tendons' Jacobian
 
     def __call__(self, now: Any, parts: Sequence[int], rows: Sequence[int]) -> tuple[Floats, Floats]:
-        """Return that of some of what may have bounds, 0 of a sum of joints, and of some rows of the contacts.
+        """Return that of some of `Scene.bounded`, 0 of a sum of joints, and of some rows of the contacts.
 
-        Args:
-            now: MjData of a state that is evaluated up to its forces.
-            parts: of `Scene.bounded`.
-            rows: of the contacts.
+        MjData is that of a state that is evaluated up to its forces.
         """
         if self.flat is not None and len(rows):
             lengths = self(now, parts, ())[0] if len(parts) else np.zeros(0)

@@ -71,13 +71,10 @@ class Obvious(Rows):
 
 
 def obvious(scene: Scene, *, colliding: bool = False) -> Any:
-    """Return the model of a scene: MuJoCo's contacts, solids in the place of point masses, its own law of rows.
+    """Return the model of a scene: MuJoCo's contacts and law of rows, solids in the place of point masses.
 
-    What is a bound in the scene is a shape among all others; pairs that the scene states are the only ones.
-
-    Args:
-        scene: what it is made of.
-        colliding: whether all shapes collide, in the place of rows that no part of the scene has.
+    What is a bound in the scene is a shape among all others. Pairs that the scene states are the
+    only ones, unless all shapes collide, in the place of rows that no part of the scene has.
     """
     given, scene = scene, by_shapes(scene)
     solids = _solids(scene)

@@ -286,12 +286,8 @@ def by_least_norm(
 ) -> Solve:  # fmt: skip
     """The same equations where rows may depend on each other: v' is unique, lam the least.
 
-    Args:
-        model: Pinocchio's.
-        data: its own.
-        tau: generalised forces (nv,) beside gravity and the rows.
-        left_out: rows that do not hold, among the first.
-        dependent: singular value of the rows, over the largest, that counts as zero.
+    Among the first rows some are left out and do not hold; a singular value of the rows counts as
+    zero below `dependent` times the largest.
     """
 
     @cache

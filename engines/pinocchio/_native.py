@@ -77,15 +77,11 @@ class Native:
 
 
 def apt(scene: Scene, law: Law, A: Floats) -> bool:
-    """Return whether points that stay together, under a linear law, are the only rows of a scene, and surely hold.
+    """Return whether points that stay together, under a linear law, are a scene's only rows, and surely hold.
 
     An iteration of the proximal solver leaves mu / (mu + s^2) of the error of a row, s^2 its part
     of H M^-1 H^T over the largest: one that nearly depends on others would be left behind its law.
-
-    Args:
-        scene: with its loops.
-        law: of all its rows.
-        A: H M^-1/2 of the loops (rows, nv).
+    A is H M^-1/2 of the loops (rows, nv).
     """
     points = bool(scene.loops) and all(loop.type == "connect" for loop in scene.loops)
     only = points and law.linear and len(law.a0) == len(A)

@@ -145,11 +145,7 @@ class JumpCheck:
 
 
 def unwrapped(times: Floats, values: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """An angle (n,), rad, at times, s, without its wraps: whole turns taken off, from each of them on.
-
-    Returns:
-        The angle, and the indices where it wrapped.
-    """
+    """An angle (n,), rad, at times, s, without its wraps, which are whole turns; and their indices."""
     turns = np.zeros(len(values))
     for part, low, high in _chunks(len(values), True, True):
         found, _ = find_jumps(times[part], values[part], True)

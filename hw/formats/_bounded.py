@@ -159,14 +159,7 @@ class Chunks:
         self._left = budget.memory // KEPT
 
     def unfold(self, key: int, compression: str, raw: bytes, declared: int | None = None) -> bytes:
-        """One chunk.
-
-        Args:
-            key: which it is.
-            compression: its name.
-            raw: what stands in the file.
-            declared: size that the file tells; None if it does not.
-        """
+        """One chunk, whose declared size the file may tell."""
         if key in self._kept:
             return self._kept[key]
         if compression not in UNFOLD:

@@ -37,12 +37,7 @@ def starts(path: Path) -> list[int]:
 
 
 def described(path: Path, start: int) -> tuple[str, tuple[int, ...], str]:
-    """Name, shape and class of a variable, from the first bytes of it: a compressed one is not unfolded for them.
-
-    Args:
-        path: the file.
-        start: where the variable begins, of `starts`.
-    """
+    """Name, shape and class of a variable, from its first bytes: a compressed one is not unfolded for them."""
     with path.open("rb") as file:
         order = _order(file.read(HEADER))
         file.seek(start)
@@ -74,13 +69,7 @@ def _element(raw: bytes, at: int, order: str) -> tuple[bytes, int]:
 
 
 def whole_variable(path: Path, start: int, budget: Budget) -> io.BytesIO:
-    """One variable as a MAT file of its own, not compressed.
-
-    Args:
-        path: the file.
-        start: where the variable begins, of `starts`.
-        budget: what it may unfold to.
-    """
+    """One variable, from where `starts` says, as a MAT file of its own that is not compressed."""
     with path.open("rb") as file:
         header = file.read(HEADER)
         order = _order(header)

@@ -46,16 +46,9 @@ class Leaf:
 
 
 def topic_group(topic: str, rows: int, message: Any, clocks: Sequence[str]) -> tuple[Group, dict[str, Leaf]]:
-    """The columns of a topic, from its first message.
+    """The columns of a topic, from its first message, and the leaf of every column but the clocks.
 
-    Args:
-        topic: name of the topic, the group's name.
-        rows: number of its messages.
-        message: the decoded message.
-        clocks: times that the file keeps beside each message, ns, for example ("log_time",).
-
-    Returns:
-        The group, and the leaf of every column but the clocks.
+    Clocks are times that the file keeps beside each message, ns, for example ("log_time",).
     """
     leaves = {leaf.name: leaf for leaf in _leaves(message, topic, ())}
     times = tuple(Column(name=f"{topic}.{clock}", type="int64", unit="ns") for clock in clocks)
@@ -144,16 +137,7 @@ def rows_of(
     path: Path, what: str, messages: Iterable[tuple[Mapping[str, int], Callable[[], Any]]], group: Group,
     leaves: Mapping[str, Leaf], columns: Sequence[str],
 ) -> Iterator[Block]:  # fmt: skip
-    """Blocks out of a topic's messages.
-
-    Args:
-        path: the log, for messages of errors.
-        what: name of its format, for those too.
-        messages: for each, its clocks (column -> ns) and a function that decodes it.
-        group: the topic's columns.
-        leaves: where a message holds each.
-        columns: the wanted ones.
-    """
+    """Blocks out of a topic's messages: of each its clocks (column -> ns) and a function that decodes it."""
     types = {column.name: column.type for column in group.columns}
     row = 0
     kept: dict[str, list[Any]] = {name: [] for name in columns}

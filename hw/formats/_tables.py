@@ -102,15 +102,7 @@ def spans(rows: int) -> Iterator[tuple[int, int]]:
 def sliced(
     path: Path, what: str, group: Group, columns: Sequence[str], get: Callable[[str, int, int], NDArray[Any]]
 ) -> Iterator[Block]:
-    """Blocks whose columns are read one by one.
-
-    Args:
-        path: the log.
-        what: what its parser takes it for.
-        group: whose rows.
-        columns: the wanted ones.
-        get: (name, start, stop) -> those rows of a column.
-    """
+    """Blocks whose columns are read one by one; `get` gives the rows of a column by name, start and stop."""
     for start, stop in spans(group.rows or 0):
         block: Block = {}
         for name in columns:

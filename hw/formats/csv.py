@@ -209,18 +209,10 @@ FORMULA = ("=", "+", "-", "@")
 def find_fault(
     path: Path, options: Options, delimiter: str, columns: Sequence[str], cause: Exception, start: int = 0
 ) -> LogFormatError:
-    """Read the text again, line by line, up to the first cell that is no number or the first line of a wrong width.
+    """Read the text again up to the first cell that is no number or the first line of a wrong width.
 
-    Args:
-        path: the table.
-        options: its layout.
-        delimiter: between cells.
-        columns: columns whose cells must be numbers.
-        cause: what the parser said, for a fault that only it sees.
-        start: rows that are known to be good.
-
-    Returns:
-        The error to raise.
+    So many rows at the start are known to be good; what the parser said is the cause that only it
+    sees.
     """
     try:
         with path.open(encoding=options.encoding, newline="") as file:

@@ -25,14 +25,9 @@ _KINDS = {
 
 
 def links(name: str, title: str, values: Mapping[str, float], count: int, restart: float) -> Model:
-    """The model of a chain.
+    """The model of a chain of so many links, with the usual time between restarts, s.
 
-    Args:
-        name: of the model.
-        title: it in words.
-        values: defaults by name (gravity, m1, a1, ...); what is not named is 0, or the slip rate 0.01 rad/s.
-        count: number of links.
-        restart: usual time between restarts, s.
+    Values not named (gravity, m1, a1, ...) are 0, the slip rate 0.01 rad/s.
     """
     own = link_chain.names(count)
     table = {

@@ -37,12 +37,7 @@ def drop_duplicates(block: Rows) -> tuple[Rows, tuple[Repair, ...]]:
 
 
 def unwrap(block: Rows, angles: Collection[int]) -> tuple[Rows, tuple[Repair, ...]]:
-    """Take whole turns off angles from where they wrap on.
-
-    Args:
-        block: the whole log; time strictly increasing.
-        angles: indices of the values that are coordinates in rad.
-    """
+    """Take whole turns off angles (indices of coordinates in rad) of a whole log from where they wrap on."""
     values, told = list(block.values), list[NDArray[np.int64]]()
     for i in angles:
         values[i], wraps = unwrapped(block.time, block.values[i])

@@ -32,17 +32,10 @@ class Rows:
 
 
 def join(path: Path, how: str, time: Floats, other: Rows, column: str) -> tuple[tuple[Floats, ...], int]:
-    """Values of other rows at the times of a log.
+    """Values (n,) of other rows at the times (n,), s, of a log; and how many lead without any.
 
-    Args:
-        path: the log, for messages.
-        how: "exact", "hold" or "linear".
-        time (n,): the log's times, s.
-        other: the rows to take values from, with increasing times.
-        column: one of their columns, for messages.
-
-    Returns:
-        The values (n,) of each signal, NaN where there are none, and the number of leading rows without any.
+    They are taken "exact", by "hold" or "linear", NaN where there are none; path and column are for
+    messages.
     """
     back = np.flatnonzero(~(np.diff(other.time) > 0.0))
     if len(back):

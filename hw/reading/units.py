@@ -49,11 +49,7 @@ class Conversion:
 
 
 def to_si(unit: str) -> Conversion:
-    """The conversion of a unit to SI.
-
-    Args:
-        unit: as people write it: "deg", "rpm", "N m", "m/s^2", "mm", "degC", "1".
-    """
+    """The conversion of a unit to SI, as people write it: "deg", "rpm", "N m", "m/s^2", "mm", "degC", "1"."""
     try:
         return _convert(unit.strip())
     except ModuleNotFoundError as error:

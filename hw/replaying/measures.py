@@ -56,14 +56,7 @@ def bias(y: Floats, yhat: Floats) -> float:
 
 
 def delay(y: Floats, yhat: Floats, step: float, reach: float = REACH) -> float:
-    """How much later the measurement is than the prediction, s; see `shift`, which takes their first differences.
-
-    Args:
-        y: measured, equidistant (n,).
-        yhat: predicted (n,).
-        step: time between samples, s.
-        reach: largest lag, as a part of the record.
-    """
+    """How much later the measurement is than the prediction, s: `shift` of their first differences."""
     return shift([np.diff(y)], [np.diff(yhat)], step, reach)
 
 

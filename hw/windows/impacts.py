@@ -27,13 +27,7 @@ class Impacts:
 
 
 def impacts(t: Floats, y: Floats, least: float) -> Impacts:
-    """Stretches in which the second difference of y stays above `least`, m/s^2.
-
-    Args:
-        t: times (n,), s.
-        y: positions (n,), m.
-        least: an acceleration that only an impact has.
-    """
+    """Stretches in which the second difference of positions y, m, at t, s, stays above `least`, m/s^2."""
     rate, middle = np.diff(y) / np.diff(t), 0.5 * (t[1:] + t[:-1])
     step = np.diff(middle)
     jump, hit = np.diff(rate), np.zeros(len(t), dtype=bool)

@@ -18,10 +18,8 @@ from crossbody.cases.arrays import Floats
 def difference(y: Floats, yhat: Floats, turns: Sequence[int] = ()) -> Floats:
     """Measured less predicted (n, k); of turns log(R(y) R(yhat)^-1), rad, in the axes of the world.
 
-    Args:
-        y: (n, k).
-        yhat: (n, k); NaN where there is no prediction.
-        turns: of each turn, the first of the three columns that are its rotation vector.
+    yhat is NaN where there is no prediction; a turn is the first of the columns of its rotation
+    vector.
     """
     found: Floats = y - yhat
     for i in turns:

@@ -60,13 +60,9 @@ class Correlation:
 def autocorrelation(
     residual: Floats | Sequence[Floats], most: int = LAGS, stride: int = 1, floor: float = 0.0
 ) -> Correlation:
-    """Of a residual with itself, lags 0 to `most`.
+    """Of a residual (n,), or one array a window, with itself, lags 0 to `most` in means of `stride` samples.
 
-    Args:
-        residual: (n,), or one array a window.
-        most: largest lag, in averages.
-        stride: samples to average.
-        floor: size of an error that is not worth telling.
+    An error below `floor` is not worth telling.
     """
     pieces = [averaged(piece, stride) for piece in _pieces(residual)]
     found = _correlation(pieces, pieces, min(most, max(map(len, pieces)) - 1))

@@ -59,21 +59,10 @@ def analyse(
     name: str, variant: str | None, pairs: Sequence[str], at: Sequence[str], *, bode: bool, locus: str | None,
     mapped: bool, out: Path | None, command: str,
 ) -> int:  # fmt: skip
-    """Analyse one case.
+    """Analyse one case; 1 if an engine's model is outside its limit without a known reason, else 0.
 
-    Args:
-        name: of the case.
-        variant: its first if not given.
-        pairs: K=V, parameters to change.
-        at: K=V, where to look.
-        bode: frequency responses too.
-        locus: PARAM=a..b, poles over that parameter.
-        mapped: stability over the workspace.
-        out: folder to write; nothing is written without it.
-        command: what was typed, for provenance.
-
-    Returns:
-        1 if an engine's model is outside its limit without a known reason, else 0.
+    Pairs K=V are parameters to change, or where to look; locus is PARAM=a..b; without a folder
+    nothing is written.
     """
     overrides, place = choice.parse_settings(pairs), parse_place(at)
     case = cases.load(name, variant, **overrides)
@@ -105,14 +94,7 @@ def analyse(
 
 
 def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
-    """Frequency responses in the grasp, poles in every mode set.
-
-    Args:
-        name: of the case.
-        pairs: K=V, parameters of the case to change; k* is the figure's own.
-        out: folder to write.
-        command: what was typed, for provenance.
-    """
+    """Frequency responses in the grasp, poles in every mode set; parameters k* are the figure's own."""
     curves.check(name)
     parameters = choice.parse_settings(pairs)
     if "kstar" in parameters:

@@ -52,11 +52,7 @@ class Ask:
 
 
 def audit(ask: Ask) -> int:
-    """Audit one file.
-
-    Returns:
-        1 if a reader makes something else of the file or fails, else 0.
-    """
+    """Audit one file; 1 if a reader makes something else of the file or fails, else 0."""
     existing(ask.path)
     _check_out(ask)
     found, rows = read_by_all(ask)

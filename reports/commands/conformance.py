@@ -25,17 +25,9 @@ STUDY = "conformance"
 
 
 def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, command: str) -> int:
-    """Run the table.
+    """Run the features whose names have that part, on some importers or all.
 
-    Args:
-        engines: names of importers; all of them if there are none.
-        part: of the names of the features that are run; empty for all.
-        seconds: what an importer may take for one of them.
-        out: folder to write.
-        command: what was typed, for provenance.
-
-    Returns:
-        0: what engines do is no fault of the run.
+    Return 0: what engines do is no fault of the run.
     """
     wanted = importers.known(engines)
     if not (features := [feature for feature in FEATURES if part in feature.name]):

@@ -67,16 +67,7 @@ def _ended(model: str, engine: str) -> bool:
 
 
 def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: str, limit: float = watch.LIMIT) -> int:
-    """Replay a log and write the report.
-
-    Args:
-        ask: log, map and model.
-        kind: "forward" or "closed_loop".
-        wanted: engines, E or E:PROFILE; all usual ones if empty.
-        out: folder to write.
-        command: what was typed, for provenance.
-        limit: time after which an engine that has not come back is ended with its process, s.
-    """
+    """Replay a log, "forward" or "closed_loop", on engines or all usual ones, and write the report."""
     hw.models.load(ask.model)
     output.check(out, "replay")
     given = comparison.parse(ask.limits)
@@ -122,16 +113,9 @@ def run_identify(
 ) -> int:  # fmt: skip
     """Identify parameters, replay the log with them, and write the report.
 
-    Args:
-        ask: log, map and model.
-        free: names of the parameters; "delay" is that of the measured coordinates.
-        hold: every hold-th window is held out of the fit; 0 for none.
-        starts: "auto", "measured" or "free".
-        stride: of so many samples one is compared.
-        budget: time that the search may take, s.
-        out: folder to write.
-        command: what was typed, for provenance.
-        limit: time after which it is stopped, s; its process is ended where it does not stop then.
+    "delay" is free too, as that of the measured coordinates; every hold-th window is held out of
+    the fit. The search ends at its budget, s; at the limit it is stopped, with its process if need
+    be.
     """
     model = hw.models.load(ask.model)
     output.check(out, "identify")

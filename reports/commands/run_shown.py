@@ -50,11 +50,9 @@ def show(rows: Sequence[Row], times: Times) -> None:
 
 
 def show_time(clock: Sequence[float], times: Times) -> None:
-    """Print where the time of the command went.
+    """Print where the time of the command went: from when runs, verdicts and pages began, and all ended, s.
 
-    Args:
-        clock: when runs, verdicts and pages began, and when all ended, s.
-        times: of every run; those of cases at once, or of an earlier attempt, are no parts of this time.
+    Times of cases at once, or of an earlier attempt, are no parts of this time.
     """
     spent: dict[str, float] = {}
     for (_, who), (_, whole) in times.items():

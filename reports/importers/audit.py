@@ -131,12 +131,9 @@ def _answered(
 
 
 def opened(path: Path, without: str = "", job: dict[str, Any] | None = None) -> Audit:
-    """Return what a file says, with the states at which it is compared.
+    """Return what a file says, less what is left out, with the states at which it is compared.
 
-    Args:
-        path: of the file.
-        without: what is left out.
-        job: states that are to be taken, where the file has its joints.
+    Those of a job are taken where the file has its joints.
     """
     model, told = read(path, without)
     scene = scene_of(path, model)

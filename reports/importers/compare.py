@@ -74,14 +74,10 @@ def rows(
     engine: str, found: Mapping[str, Any], wanted: Mapping[str, Any], joints: Sequence[Sequence[str]],
     named: Mapping[int, Mapping[str, Set[str]]] | None = None,
 ) -> list[Row]:  # fmt: skip
-    """Return what an importer has made of a file, beside what it says.
+    """Return what an importer has made of a file, its answer, beside that of a reader without fault.
 
-    Args:
-        engine: name of the importer.
-        found: its answer.
-        wanted: that of a reader without fault.
-        joints: name, body and kind of each, in the order of the coordinates.
-        named: line of the file -> tag -> names of the parts that stand there.
+    Joints are name, body and kind in the order of the coordinates; `named` is line of the file ->
+    tag -> names of the parts that stand there.
     """
     if found["status"] != "read":
         error = [found.get("error", found["why"]), *(line for line in found["told"][-1:] if "error" in line.lower())]

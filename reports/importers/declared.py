@@ -22,11 +22,7 @@ OF_MASS = ("inertia", "M", "gravity", "bias", "energy")
 def excused(told: Sequence[Row], answer: Mapping[str, Any], audit: Any, forms: Forms) -> list[Row]:
     """Return rows, those unsupported that differ by no more than what the engine says that it leaves out.
 
-    Args:
-        told: rows of one importer.
-        answer: its answer.
-        audit: of the file.
-        forms: of the file, opened at the states of that audit where they have its joints.
+    Forms of the file are opened at the states of its audit where they have its joints.
     """
     lines = [line for line in answer["told"] if SAID.search(line) and any(
         pattern.search(line) for pattern in (ATTRIBUTE, CHILD, PART))]  # fmt: skip

@@ -54,11 +54,7 @@ def _drawn(joint: Joint, draw: np.random.Generator) -> list[float]:
 def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None = None) -> dict[str, Any]:
     """Return the answer of a reader without fault.
 
-    Args:
-        scene: what the file means.
-        job: of `job_of`.
-        touching: names of the shapes that may touch something; without them neither shapes nor
-            contacts are told.
+    Of shapes some may touch something; without their names neither shapes nor contacts are told.
     """
     states = [
         (np.concatenate([np.zeros(0), *state["q"]]), np.concatenate([np.zeros(0), *state["v"]]))

@@ -24,12 +24,7 @@ Place = tuple[Path, int]
 
 
 def with_lines(path: Path, folder: Path | None = None) -> tuple[Node, dict[Node, Place]]:
-    """Return the root of a file, what it includes in its place, and file and line of every element and <include>.
-
-    Args:
-        path: of the file, whose includes were looked at before.
-        folder: of the file that includes it.
-    """
+    """Return the root of a file with its includes, and file and line of every element and <include>."""
     builder, parser, places = ElementTree.TreeBuilder(), expat.ParserCreate(), dict[Node, Place]()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -115,12 +110,7 @@ class Forms:
         self._temporary.cleanup()
 
     def opened(self, key: object, change: Change) -> Any:
-        """Return the audit of a form; None where that is no robot.
-
-        Args:
-            key: of the form.
-            change: what makes it, of the file with what it includes.
-        """
+        """Return the audit of the form that a change makes of the file; None where that is no robot."""
         return self.made(key, lambda out: written(self.path, change, out))
 
     def made(self, key: object, write: Callable[[Path], None]) -> Any:

@@ -17,11 +17,7 @@ ROWS = {"energy_created": "energy created / energy in", PATTERN: "pattern distan
 
 
 def gap_map(rows: pd.DataFrame) -> Figure:
-    """Two plots a number of balls; a run that failed is a cross on the axis.
-
-    Args:
-        rows: as `crossbody.reports.maps.gapmap.gap_map` gives them.
-    """
+    """Two plots a number of balls, of rows of `maps.gapmap`; a run that failed is a cross on the axis."""
     drawn = rows[rows["s"].notna()]
     counts = list(dict.fromkeys(drawn["n"])) or [0]
     panels = Panels(
@@ -62,11 +58,7 @@ LINE = 17  # height of one scene, pixels
 
 
 def stability(rows: pd.DataFrame) -> Figure:
-    """When the ball arrived, or until when it ran.
-
-    Args:
-        rows: as `crossbody.reports.maps.stability.stability_map` gives them.
-    """
+    """When the ball arrived, or until when it ran, of rows of `maps.stability.stability_map`."""
     drawn = rows[rows["ended"].notna()].iloc[::-1]
     names = drawn["scene"].where(drawn["scene"] != "", "default")
     several = drawn["engine"].nunique() > 1
@@ -91,11 +83,7 @@ FIELD = 240  # height of a row of fields, pixels
 
 
 def stress_map(cells: pd.DataFrame) -> Figure:
-    """Two fields a row; a cross where a run did not finish.
-
-    Args:
-        cells: as `crossbody.reports.sweep.map.stability_map` gives them.
-    """
+    """Two fields a row of `sweep.map.stability_map`; a cross where a run did not finish."""
     drawn = cells[cells["finished"].notna() & (cells["knob"] != "")]
     groups = [(key, group) for key, group in drawn.groupby(["engine", "profile", "knob"], sort=False)]
     rows = max(-(-len(groups) // 2), 1)

@@ -85,18 +85,10 @@ def _supported(line: Line, n: int) -> tuple[str, str]:
 def gap_map(
     counts: Sequence[int], picks: Iterable[Pick], points: int, tell: Callable[[str], None] = lambda _: None
 ) -> pd.DataFrame:
-    """Run every engine over s from 0 to 3.
+    """Run every engine over so many values of s from 0 to 3; one row a run, columns `COLUMNS`.
 
-    Args:
-        counts: numbers of balls.
-        picks: the engines.
-        points: values of s.
-        tell: is told what is being done, once a line.
-
-    Returns:
-        One row a run, columns `COLUMNS`: ratios to the energy, momentum and speed that came in. A
-            line that cannot be
-        had is one row with its sentence; a run that failed stays, with its outcome.
+    They are ratios to the energy, momentum and speed that came in. A line that cannot be had is one
+    row with its sentence; a run that failed stays, with its outcome.
     """
     rows: list[dict[str, Any]] = []
     for n in counts:
@@ -167,12 +159,7 @@ def _nearest(apart: Mapping[str, float]) -> str:
 
 
 def summary(rows: pd.DataFrame, ideal: float = 1e-3) -> pd.DataFrame:
-    """One row a line: its largest gain of energy and where, whom it follows at s = 0, and from which s on it is ideal.
-
-    Args:
-        rows: as of `gap_map`.
-        ideal: largest pattern distance to the sequential truth that counts as ideal.
-    """
+    """One row a line: its largest gain of energy and where, whom it follows at s = 0, from where it is ideal."""
     found = []
     for (n, engine, profile, machine), group in rows.groupby(["n", "engine", "profile", "machine"], sort=False):
         about = {"n": n, "engine": engine, "profile": profile, "machine": machine}

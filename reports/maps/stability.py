@@ -92,17 +92,10 @@ POINTS = (
 def stability_map(
     picks: Iterable[Pick] = (DEFAULT,), points: Sequence[Point] = POINTS, tell: Callable[[str], None] = lambda _: None
 ) -> pd.DataFrame:
-    """Run every point on every engine.
+    """Run every point on every engine, the reference to 1e-8; one row a run, columns `COLUMNS`.
 
-    Args:
-        picks: the engines; the reference runs with a tolerance of 1e-8, the others with their own.
-        points: the scenes.
-        tell: is told what is being done, once a point.
-
-    Returns:
-        One row a run, columns `COLUMNS`: ended is where the run ended, arrival when the ball came
-            to the centre to
-        stay, s. What an engine cannot run is a row with its sentence.
+    `ended` is where the run ended, `arrival` when the ball came to the centre to stay, s. What an
+    engine cannot run is a row with its sentence.
     """
     rows = []
     for pick in picks:

@@ -42,13 +42,7 @@ PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit"
 
 
 def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
-    """All sections of one case; its motions are read here and forgotten with the page.
-
-    Args:
-        found: what a folder holds.
-        case: one of its cases.
-        share: of the usual room of plots and playback that they may take.
-    """
+    """All sections of one case, with a share of the usual room; its motions are forgotten with the page."""
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about),

@@ -124,14 +124,7 @@ def heat_of(row: Row) -> int:
 
 
 def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, float]) -> list[Line]:
-    """Lines of one case: all together, what it costs, and every metric judged for some engine (all, if none is).
-
-    Args:
-        rows: verdicts of the case.
-        page: name of its page.
-        label: of the case.
-        walls: run time of each engine, s.
-    """
+    """Lines of one case: all together, what it costs (s), every metric judged for some engine, or all."""
     engines, mine = names(rows), by(rows, "who")
     least = min((wall for wall in walls.values() if wall), default=0.0)
     together = [whole(label, page, who, mine[who], None) for who in engines]

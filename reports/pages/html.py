@@ -155,14 +155,7 @@ def environment() -> Environment:
 
 
 def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single: bool = False) -> str:
-    """HTML of one page, or of all in one file.
-
-    Args:
-        pages: one, or all if `single`.
-        links: navigation, the same on every page.
-        footer: what made it, in one line.
-        single: whether style and scripts stand in the file and links stay inside it.
-    """
+    """HTML of one page, or of all in one file, in which style and scripts stand and links stay inside."""
 
     def href(page: str, anchor: str = "") -> str:
         inside = f"#{page}--{anchor}" if anchor else f"#{page}"
@@ -189,9 +182,7 @@ THEME = (
 def policy(scripts: Sequence[str], single: bool) -> str:
     """The page's Content-Security-Policy: it runs the scripts that stand here and asks nobody for anything.
 
-    Args:
-        scripts: what stands in script elements of the page, told by their hashes.
-        single: whether the page has all its scripts in it; if not, those of the files beside it run too.
+    Scripts are told by their hashes; those of the files beside a page run too, unless it is single.
     """
     hashes = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts)
     allowed = " ".join([*(f"'sha256-{digest}'" for digest in hashes), *([] if single else ["'self'"])])

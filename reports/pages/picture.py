@@ -239,15 +239,7 @@ def raster(strokes: Sequence[Stroke]) -> Any:
 
 
 def write(film: Film, path: Path, t: float, fps: float, speed: float) -> None:
-    """Write a picture of one instant, or of a whole motion where the file is a GIF.
-
-    Args:
-        film: the motion.
-        path: .svg, .png or .gif.
-        t: instant, s.
-        fps: pictures a second of a GIF.
-        speed: seconds of the motion in one of a GIF.
-    """
+    """Write an SVG or PNG of one instant, s, or the motion as a GIF of fps at so many times real time."""
     end = float(film.t[-1])
     if path.suffix not in SUFFIXES:
         raise InvalidValue(f"{path.name} is not a known kind of picture; valid: {', '.join(SUFFIXES)}.")

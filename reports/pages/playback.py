@@ -132,14 +132,10 @@ def chosen(t: Floats, events: Floats, frames: int) -> NDArray[np.intp]:
 
 
 def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
-    """Of every multiplier the value of largest size in the samples since the picture before.
+    """Of every multiplier the value of largest size since the picture before (frames, nc), N.
 
-    Args:
-        lam: (n, nc), N.
-        ends: of each picture, how many samples are past (frames,), nondecreasing, at least 1.
-
-    Returns:
-        (frames, nc), N; 0 where the engine cannot tell.
+    `ends` are how many samples are past at each picture (frames,), nondecreasing, at least 1; 0
+    where nobody can tell.
     """
     known = np.nan_to_num(lam)
     found = np.empty((len(ends), lam.shape[1]))

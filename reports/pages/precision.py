@@ -30,14 +30,7 @@ LADDERS = (
 
 
 def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: Mapping[str, float]) -> list[Section]:
-    """The section, if there is anything to show.
-
-    Args:
-        out: the folder, which may hold a benchmark.
-        label: of the case.
-        rows: verdicts of the case.
-        walls: run time of each engine, s.
-    """
+    """The section, if there is anything to show: a benchmark in the folder, or verdicts and run times, s."""
     if ladders := _ladders(out, label):
         import pandas as pd
 
@@ -67,11 +60,7 @@ def overview(found: Results) -> list[Section]:
 
 
 def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
-    """One mark a case, a colour and a symbol an engine.
-
-    Args:
-        points: engine -> case, error of position (relative), run time in ms.
-    """
+    """One mark a case, a colour and a symbol an engine: error of position (relative), run time in ms."""
     data = [
         {
             "type": "scatter", "mode": "markers", "x": [error for _, error, _ in mine],
@@ -105,11 +94,7 @@ def _ladders(out: Path, label: str) -> list[dict[str, Any]]:
 
 
 def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
-    """One mark an engine.
-
-    Args:
-        points: engine, error of position (relative), run time in ms.
-    """
+    """One mark an engine: error of position (relative), run time in ms."""
     finite = [error for _, error, _ in points if math.isfinite(error)]
     edge = 10.0 * max([*finite, FLOOR])
     data = [

@@ -161,13 +161,7 @@ def _missing(label: str, engines: list[str], times: Times, broken: list[str]) ->
 
 
 def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
-    """One motion of a folder, and its place among those of its case.
-
-    Args:
-        out: the folder.
-        case: case:variant; the first if empty.
-        engine: engine or engine:profile; "truth" for the truth.
-    """
+    """One motion of a folder, "truth" or of an engine:profile, and its place among those of its case."""
     found = _cases(out, verdicts_of(out))[0]
     mine = next((one for one in found if one.paths and case in ("", one.label)), None)
     if mine is None:

@@ -21,10 +21,7 @@ SIGMAS = 2.0  # half of the noise band, standard deviations
 def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:
     """What was measured, and what every engine predicts in its band of noise, a plot a channel.
 
-    Args:
-        rows: `who`, `channel`, `unit`, `window`, `t`, `measured`, `value` (measured less predicted).
-        noise: channel -> standard deviation of the measurement's noise.
-        held: windows that were not fitted, which are shaded.
+    Windows that were held out of a fit are shaded; values of rows are measured less predicted.
     """
     channels = _channels(rows)
     data: list[dict[str, Any]] = []

@@ -21,14 +21,9 @@ WIDTH = 120  # of the tables in a file or a pipe
 
 
 def info(path: Path, columns: str | None, part: int | None, draft_only: bool, memory: int = 1000) -> int:
-    """Say what is in a log and what is wrong with it.
+    """Say what is in a log and what is wrong with it, by a column map or, without one, by its draft.
 
-    Args:
-        path: the log.
-        columns: a column map to check it by; if not given, one is drafted.
-        part: number of the run, where the map tells several apart.
-        draft_only: whether to print the drafted map and nothing else.
-        memory: that reading may take over the file's own size, MB.
+    Reading may take so many MB over the file's own size.
     """
     room = memory * 1_000_000
     found = hw.survey(path, columns, memory=room)

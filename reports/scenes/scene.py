@@ -138,15 +138,8 @@ def _meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
 def slip(scene: Scene, contact: Contact, place: int, q: Floats, v: Floats) -> Floats:
     """Return the velocity of the second shape over a plane along the plane's x and y (n, 2), m/s.
 
-    Where they meet is kept as a point of the second body, and of the plane's; both go along the
-    velocities by SHORT.
-
-    Args:
-        scene: whose bodies they are.
-        contact: of a plane, its first shape, and another.
-        place: which of its places.
-        q: coordinates (n, nq).
-        v: velocities (n, nv).
+    Where they meet, at one place of the contact, is kept as a point of the second body, and of the
+    plane's; both go along the velocities by SHORT.
     """
     owners = [shape.body for shape in (contact.first, contact.second)]
     now, turns = body_poses(scene, q), matrices(np.asarray(contact.first.orientation))

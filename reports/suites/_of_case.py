@@ -21,12 +21,7 @@ VARIANTS = 4
 
 
 def suite_of(name: str, fixed: Mapping[str, Value]) -> Suite:
-    """Return the suite of a case that is a file.
-
-    Args:
-        name: path of the file.
-        fixed: parameters that are the same in every run.
-    """
+    """Return the suite of a case that is a file, with parameters that are the same in every run."""
     families = []
     for variant in cases.variants(name)[:VARIANTS]:
         case = cases.load(name, variant, **fixed)

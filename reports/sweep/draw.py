@@ -57,15 +57,7 @@ def check(name: str, suite: Suite) -> None:
 
 
 def scenes(name: str, family: Family, place: int, runs: int, seed: int) -> Iterator[Scene]:
-    """The draws of one family.
-
-    Args:
-        name: of the suite.
-        family: what is drawn.
-        place: of the family in its suite.
-        runs: how many; a family without random axes has no more than its grid has points.
-        seed: of the sweep.
-    """
+    """The draws of one family; without random axes no more than its grid has points."""
     root = np.random.SeedSequence([seed, zlib.crc32(name.encode()), place])
     order, scramble, runs_root = root.spawn(3)
     total = runs if family.axes else min(runs, family.points)
@@ -95,12 +87,8 @@ def specs(
 ) -> list[Spec]:
     """Every run of a sweep, in the order of its table.
 
-    Args:
-        suites: names and suites.
-        engines: name of a suite -> who runs it, the first of them all of it.
-        runs: of the first engine over all suites, shared as their own numbers are; these, if not given.
-        seed: of the sweep.
-        share: whether the engines behind the first make one run in `SHARE` only.
+    The first engine of a suite makes all of its runs, shared over the suites as their own numbers
+    are; those behind it, if they share, one in `SHARE`.
     """
     if runs is not None and runs < 1:
         raise InvalidValue(f"--runs is {runs}; a sweep needs at least 1.")

@@ -56,10 +56,7 @@ class Tried:
 def execute(spec: Spec, alone: bool = False) -> dict[str, Any]:
     """Run one spec within its bounds, and judge it.
 
-    Args:
-        spec: what is run.
-        alone: whether this process does nothing else: its output is then watched, and it may be
-            ended if it hangs.
+    A process that does nothing else has its output watched, and may be ended if it hangs.
     """
     heard: list[str] = []
     with ExitStack() as stack:

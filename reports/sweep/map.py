@@ -49,11 +49,9 @@ def _worst(values: pd.Series[float]) -> float:
 
 
 def stability_map(rows: pd.DataFrame) -> pd.DataFrame:
-    """Which engine at which tolerance or step on which stiffness.
+    """Which engine at which tolerance or step on which stiffness: one row a cell, columns `MAP`.
 
-    Returns:
-        One row a cell, columns `MAP`; errors are the worst over all other axes, infinite where a
-        contact misses.
+    Errors are the worst over all other axes, infinite where a contact misses.
     """
     mapped = rows[rows["suite"] == STABILITY]
     cells: dict[tuple[Any, ...], list[int]] = {}

@@ -32,14 +32,7 @@ def failures(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def reproducers(rows: pd.DataFrame, specs: Sequence[Spec], count: int, tell: Callable[[str], None]) -> pd.DataFrame:
-    """The smallest scene found for the first failure of every kind: one suite, scene, engine, outcome and verdict.
-
-    Args:
-        rows: of the sweep.
-        specs: of its runs.
-        count: of processes; 1 for this one.
-        tell: is told of each that is found.
-    """
+    """The smallest scene found for the first failure of every kind: suite, scene, engine, outcome, verdict."""
     kinds = [group for _, group in failures(rows).groupby(list(KINDS), sort=False)]
     firsts = [(specs[int(group["index"].iloc[0])], group.iloc[0]) for group in kinds]
     small = [_as_it_came(*first) for first in firsts]
@@ -97,10 +90,10 @@ def _same(spec: Spec, first: pd.Series[Any]) -> Fails:
 def shrink(
     parameters: Mapping[str, Value], own: Mapping[str, Value], fails: Fails, tries: int = TRIES
 ) -> tuple[dict[str, Value], int]:
-    """Move parameters to their defaults: all the way if it still fails, else part of it, then to a few digits.
+    """Move parameters to their defaults: all the way if it still fails, else in part, then to a few digits.
 
-    Returns:
-        What has to be said, and how often was asked. A failure that does not repeat is returned as it came.
+    Return what has to be said, and how often was asked. A failure that does not repeat is returned
+    as it came.
     """
     left, asked = dict(parameters), 0
 

@@ -205,11 +205,9 @@ class Tls:
 
 
 def connect(address: str, tls: Tls | None = None) -> Any:
-    """A client of a dask.distributed cluster.
+    """A client of a dask.distributed cluster at tcp://HOST:PORT, or tls://HOST:PORT with `tls`.
 
-    Args:
-        address: tcp://HOST:PORT, or tls://HOST:PORT with `tls`.
-        tls: who both ends are; without it the connection is neither encrypted nor authenticated.
+    Without it the connection is neither encrypted nor authenticated.
     """
     try:
         from distributed import Client

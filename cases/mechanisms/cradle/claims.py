@@ -61,13 +61,7 @@ def _pushes(run: Trajectory, case: Case) -> NDArray[np.bool_]:
 
 
 def distance(rule: str, run: Trajectory, case: Case) -> float | None:
-    """Return max |v_i - v_i of the rule| / v_in; None where the rule has no answer or collisions are not over.
-
-    Args:
-        rule: one of `crossbody.cases.mechanisms.cradle.rules.RULES`.
-        run: the motion.
-        case: of a cradle.
-    """
+    """Return max |v_i - v_i of the rule| / v_in; None where the rule has no answer or collisions go on."""
     balls = row(case)
     expected, found = answer(rule, balls), outgoing(run, case)[1]
     if expected is None or found is None:
@@ -200,14 +194,7 @@ _STEP: Mapping[tuple[str, str], tuple[float, str]] = {
 
 
 def limits(mechanism: str, rule: str, gap: float, claims: Iterable[Claim]) -> tuple[Limit, ...]:
-    """The limits of one mechanism under one rule.
-
-    Args:
-        mechanism: "sliders" or "pendulums".
-        rule: for several contacts.
-        gap: between neighbours at rest, m; 0 where they touch.
-        claims: what the case claims: each is a count.
-    """
+    """The limits of one mechanism under one rule, with a gap between neighbours at rest, m; claims are counts."""
     counts = {claim.metric: (0.0, "a count") for claim in claims}
     return tuple(_all(mechanism, rule, {**_bounds(mechanism, rule, gap), **counts}))
 

@@ -59,9 +59,8 @@ def _reduced(masses: Floats) -> Floats:
 def _speeds(row: Row, force: Force) -> Floats:
     """Integrate until every gap is open and none closes; speeds (n,), m/s.
 
-    Args:
-        row: the balls.
-        force: forces of all pairs (n - 1,) from gaps and rates in scaled units (masses stay in kg).
+    The force gives those of all pairs (n - 1,) from gaps and rates in scaled units (masses stay in
+    kg).
     """
     n, gap = row.n, row.gap * math.sqrt(row.a0) / row.speed
 

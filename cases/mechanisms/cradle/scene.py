@@ -68,12 +68,7 @@ def masses(parameters: Mapping[str, Value]) -> Floats:
 
 
 def row(parameters: Mapping[str, Value], mechanism: str) -> Row:
-    """The balls of a case with their speeds as they arrive.
-
-    Args:
-        parameters: of the case.
-        mechanism: "sliders", or "pendulums", whose balls fall from `angle` to the bottom.
-    """
+    """The balls of a case with their speeds as they arrive; pendulums fall from `angle` to the bottom."""
     n, lifted, gap = int(parameters["n"]), int(parameters["lifted"]), float(parameters["gap"])
     if gap < 0.0:
         raise SceneError(f"newtons_cradle: gap is {gap:g} m: neighbours overlap at the start; valid: 0 or more.")
@@ -109,13 +104,7 @@ def law(balls: Row, collisions: str) -> RowLaw:
 
 
 def scene(parameters: Mapping[str, Value], mechanism: str, law: RowLaw) -> Scene:
-    """Return the balls on slides along x, or on strings beside each other; a tendon is what lies between neighbours.
-
-    Args:
-        parameters: of the case.
-        mechanism: "sliders", or "pendulums", of points at the ends of strings.
-        law: of every row.
-    """
+    """Return the balls on slides along x, or on strings beside each other; tendons lie between neighbours."""
     radius, gap = float(parameters["radius"]), float(parameters["gap"])
     hung = (0.0, 0.0, -float(parameters["length"]) if mechanism == "pendulums" else 0.0)
     kinds = {"sliders": ("slide", (1.0, 0.0, 0.0)), "pendulums": ("hinge", (0.0, -1.0, 0.0))}
@@ -140,13 +129,8 @@ def _between(
 ) -> Tendon:
     """Return what lies between neighbours: a difference of coordinates, 0 of sliders that touch, or their distance.
 
-    Args:
-        mechanism: of the case.
-        name: of the row.
-        pair: names of the neighbours.
-        reach: distance at which they touch, and their gap at rest, m.
-        point: where the ball is in its body, m.
-        law: of the row.
+    `reach` is the distance at which they touch and their gap at rest, m; the ball is at a point of
+    its body, m.
     """
     touching, gap = reach
     if mechanism == "sliders":

@@ -130,11 +130,7 @@ SINGULARITY = (*_limits(_SMOOTH), Limit(metric="swing_period", value=_SWING[0], 
 
 
 def tracking(grown: float) -> tuple[Limit, ...]:
-    """Limits of a robot on a circle.
-
-    Args:
-        grown: part of its radius that the circle has reached at the horizon.
-    """
+    """Limits of a robot on a circle, of whose radius a part has grown at the horizon."""
     value, why = _SAMPLED["position"]
     aside = {
         "position": (value / grown, why + ", over the part of the radius that is reached: sideways angles grow with it")
@@ -145,9 +141,8 @@ def tracking(grown: float) -> tuple[Limit, ...]:
 def on_the_circle(lag: float, settled: bool) -> Limit:
     """Of what the controller leaves of its path, beside the lag of a steady circle, m.
 
-    Args:
-        lag: what sampling and delay leave once the start is forgotten, m.
-        settled: whether the last third of the horizon shows that alone.
+    The lag is what sampling and delay leave once the start is forgotten, m; where it is settled,
+    the last third of the horizon shows that alone.
     """
     if settled:
         return Limit(metric="tracking_error", value=0.1 * lag, why="the lag's next order, encoder counts and friction")

@@ -37,14 +37,10 @@ def numbers(p: Mapping[str, float]) -> Floats:
 
 
 def motor_torque(y: Floats, x: Floats, asked: Floats, p: Floats, u: Floats) -> None:
-    """Write the torques (3,), N m; NaN where the loops or the flange lose a direction.
+    """Write the torques u (3,), N m; NaN where the loops or the flange lose a direction.
 
-    Args:
-        y: motor angles (3,).
-        x: the six other angles, arm by arm.
-        asked: acceleration of the flange (3,), m/s^2.
-        p: `numbers` of the robot.
-        u: receives the torques.
+    From motor angles y (3,), the six others x, arm by arm, and the acceleration asked of the flange
+    (3,), m/s^2; p are `numbers` of the robot.
     """
     l1, l2, sign, a, b, c, upper, lower = p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]
     J, M, pull = np.zeros((3, 3, 3)), np.zeros((9, 9)), np.empty(9)
@@ -135,10 +131,8 @@ class Controller:
     def __call__(self, t: float, r: Floats, rd: Floats) -> Floats:
         """Return the motor torques (3,) from t on, N m; NaN where the control Jacobian is singular.
 
-        Args:
-            t: time, s.
-            r: angles of the tree (9,); only the motors' are measured, the others start Newton's method once.
-            rd: rates, which nobody measures.
+        Of the tree's angles (9,) only the motors' are measured, the others start Newton's method
+        once.
         """
         y = np.rint(r[MOTORS] / self.quantum) * self.quantum
         rate = (y - self.before) / self.p["period"] if self.begun else np.zeros(3)

@@ -81,8 +81,7 @@ CFM, STEP = 1e-5, 1e-3  # DART's constraint force mixing, and the step of both e
 def regularised(rho: float) -> dict[tuple[str, str], float]:
     """Return the creep of Drake's profiles, m/s, whose friction is a function of the slip.
 
-    Args:
-        rho: tangent of the slope over the coefficient of friction, below 1.
+    `rho` is the tangent of the slope over the coefficient of friction, below 1.
     """
     return {
         ("drake", "default"): STICTION * rho / math.sqrt(1.0 - rho * rho),
@@ -109,13 +108,7 @@ def limits(
 ) -> Case:  # fmt: skip
     """Return a case with its title, its exact motion and the limits of all cases with friction.
 
-    Args:
-        case: the scene.
-        title: of the case.
-        parameters: of the case, for their units.
-        motion: exact, and the truth where it is one.
-        p: values of the parameters.
-        creeps: engine and profile -> speed at which its own parameters have it creep, m/s, where they say.
+    `creeps` tells engine and profile -> speed at which its own parameters have it creep, m/s.
     """
     held = 1e-9 * max(1.0, p.get("speed", 0.0))
     return replace(

@@ -45,14 +45,7 @@ def field(p: Mapping[str, float], steep: float = 0.0) -> Vector:
 
 
 def block(name: str, half: Vector, mass: float = MASS, height: float = 0.0) -> Body:
-    """Return a homogeneous block.
-
-    Args:
-        name: of the body.
-        half: its half sides, m.
-        mass: kg.
-        height: of its centre at the reference pose, m.
-    """
+    """Return a homogeneous block of half sides, m, with a mass, kg, and the height of its centre, m."""
     a, b, c = (side * side for side in half)
     inertia = tuple(mass / 3.0 * part for part in (b + c, a + c, a + b))
     return Body(name=name, mass=mass, inertia=(*inertia, 0.0, 0.0, 0.0), position=(0.0, 0.0, height))

@@ -219,10 +219,8 @@ _MULTISTEP = (
 def limits(claims: Iterable[Claim], fallen: float) -> tuple[Limit, ...]:
     """The limits of one variant beside those that every case has.
 
-    Args:
-        claims: what it claims.
-        fallen: height through which the ball moves on its face, over the radius of its circle;
-            infinite where more than gravity drives it.
+    The ball falls on its face by a part of the radius of its circle; infinite where more than
+    gravity drives it.
     """
     bounds = {**_ALWAYS, **{claim.metric: _CLAIMED[claim.metric] for claim in claims}}
     if _TOLERATED / fallen > _DEFAULT:

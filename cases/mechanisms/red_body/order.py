@@ -177,9 +177,7 @@ class Fall:
 def inequalities(p: Mapping[str, float], frozen: bool) -> tuple[str, ...]:
     """Which conditions for the order of modes are broken, one sentence part each; empty if all hold.
 
-    Args:
-        p: parameters of the case, without an offset of the slab.
-        frozen: whether collisions take no time, so that nothing has to be over before something else begins.
+    Frozen, collisions take no time, so that nothing has to be over before something else begins.
     """
     return tuple(_broken(p, frozen))
 

@@ -54,15 +54,10 @@ def tried(module: Any) -> str:
 
 
 def answered(module: Any, file: str, urdf: bool, job: Any, size: int, measured: Any) -> dict[str, Any]:
-    """Return what was measured of one file, or why there is nothing.
+    """Return what was measured of one file, or why there is nothing, within a size in bytes.
 
-    Args:
-        module: the importer.
-        file: what it reads.
-        urdf: whether that is a URDF.
-        job: gives the job, which may come later than the file.
-        size: bytes that it may take.
-        measured: robot and job -> its answer.
+    The job, which may come later than the file, is given by a function; another measures the robot
+    by it.
     """
     try:
         robot = module.open_robot(file, urdf)
