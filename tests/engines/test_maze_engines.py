@@ -11,9 +11,20 @@ from crossbody.cases import CaseUnsupported, Mode, Outcome, load
 from crossbody.cases.gates import CHANGED, START
 from crossbody.cases.mechanisms.maze import claims as cf
 from crossbody.cases.mechanisms.maze import form as maze
-from crossbody.cases.mechanisms.maze.gates import EDGE_BELOW, INWARD, OUTWARD, STRAYED
+from crossbody.cases.mechanisms.maze.gates import (
+    ABOVE,
+    BELOW,
+    CHANNEL,
+    EDGE_BELOW,
+    INWARD,
+    NORMALS,
+    OUTWARD,
+    SECTOR_ABOVE,
+    SECTOR_BELOW,
+    SOLID,
+    STRAYED,
+)
 from crossbody.cases.mechanisms.maze.geometry import maze_of
-from crossbody.cases.mechanisms.maze.rows import ABOVE, BELOW, CHANNEL, NORMALS, SECTOR_ABOVE, SECTOR_BELOW, SOLID
 from crossbody.engines import load as load_engine
 from crossbody.reference.systems import maze as reference
 from crossbody.reports import metrics

@@ -12,10 +12,9 @@ from crossbody.cases.case import Case, Force
 from crossbody.cases.errors import CaseUnsupported
 from crossbody.cases.form import Form, formed
 from crossbody.cases.gates import Gates
-from crossbody.cases.mechanisms.maze import rows as at
-from crossbody.cases.mechanisms.maze.gates import GUARDS, force, guards, switch
+from crossbody.cases.mechanisms.maze import gates as at
+from crossbody.cases.mechanisms.maze.gates import GUARDS, force, guards, rows, switch
 from crossbody.cases.mechanisms.maze.geometry import THICKNESS, Maze, Ring, maze_of, tilted_gravity
-from crossbody.cases.mechanisms.maze.rows import rows
 from crossbody.cases.scene import Actuator, Body, Joint, Scene, Shape
 
 ONLY_CONTINUOUS = "The torque is evaluated at every state here; a sampled controller runs in the reference alone."
