@@ -84,19 +84,11 @@ class FormedRun(Run):
 
     def _of_bodies(self, found: Trajectory) -> Floats:
         """Return the energies (n, 2) without those of what carries states."""
-        energy, rates = found.energy.copy(), found.v[:, self._states()]
+        place = places(self.scene)[1]
+        states = [place[joint.name] for joint in self.scene.joints if joint.body in self.states]
+        energy, rates = found.energy.copy(), found.v[:, states]
         energy[:, 0] -= 0.5 * np.sum(rates * rates, axis=1)
         return energy
-
-    def _states(self) -> list[int]:
-        """Return which velocities are rates of states."""
-        place = places(self.scene)[1]
-        return [place[joint.name] for joint in self.scene.joints if joint.body in self.states]
-
-    def _carriers(self) -> list[int]:
-        """Return which of the bodies that joints move carry states."""
-        moved = dict.fromkeys(joint.body for joint in self.scene.joints)
-        return [i for i, name in enumerate(moved) if name in self.states]
 
     def native(self) -> float:
         """Return the time of the engine's own loop, s."""
@@ -107,7 +99,8 @@ class FormedRun(Run):
         found, form = dict(self.inner.audit()), self.form
         start = form.to_case(np.atleast_2d(found["q0"]), np.atleast_2d(found["v0"]))
         found |= {"q0": start[0][0], "v0": start[1][0]}
-        found["masses"] = np.delete(found["masses"], self._carriers())
+        moved = dict.fromkeys(joint.body for joint in self.scene.joints)
+        found["masses"] = np.delete(found["masses"], [i for i, name in enumerate(moved) if name in self.states])
         if len(start[1][0]) == len(form.case.v0):
             return found | _in_case(form, found)
         terms = ("M", "bias", "H", "lam", "constants")

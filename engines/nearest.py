@@ -205,7 +205,8 @@ def _capsules(sizes: tuple[Floats, Floats], at: Pose, by: Pose, along: Truths) -
     """
     radius, width = sizes[0][..., 0], sizes[1][..., 0]
     segments, none = (at, sizes[0][..., 1], by, sizes[1][..., 1]), ~np.asarray(along)
-    feet = _feet(*segments)
+    one, half, two, other = segments
+    feet = _joined(_foot(one, half, two, other), _foot(two, other, one, half)[::-1])  # on the first, on the second
     tried = [_nearest(*segments, feet)] * 2
     if not none.all():
         chosen = none[..., None]
@@ -225,11 +226,6 @@ def _capsules(sizes: tuple[Floats, Floats], at: Pose, by: Pose, along: Truths) -
 def _axes(one: Pose, two: Pose) -> tuple[Floats, Floats, Floats]:
     """Return the axes of two capsules and the way between their centres, each (..., 3)."""
     return one[0][..., 2], two[0][..., 2], two[1] - one[1]
-
-
-def _feet(one: Pose, half: Floats, two: Pose, other: Floats) -> Pair:
-    """Return segments' ends and what is nearest on the other (..., 4, 3): of the first, of the second."""
-    return _joined(_foot(one, half, two, other), _foot(two, other, one, half)[::-1])
 
 
 def _end(one: Pose, half: Floats, two: Pose, other: Floats, sign: float, feet: Pair) -> Pair:

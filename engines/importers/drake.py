@@ -68,6 +68,8 @@ class _Robot:
         self.numbers = self._numbers(motors)
 
     def _numbers(self, motors: Any) -> dict[str, dict[str, Any]]:
+        from pydrake.multibody.tree import ForceElementIndex
+
         told: dict[str, dict[str, Any]] = {
             key: {} for key in ("armature", "damping", "lower", "upper", "stiffness", "rest", *FORCES)
         }
@@ -82,7 +84,7 @@ class _Robot:
             told["least force"][motor.joint().name()] = [-motor.effort_limit()]
             told["most force"][motor.joint().name()] = [motor.effort_limit()]
         for k in range(1, self._p.num_force_elements()):
-            spring = self._p.get_force_element(_index(k))
+            spring = self._p.get_force_element(ForceElementIndex(k))
             if hasattr(spring, "stiffness") and hasattr(spring, "joint"):
                 told["stiffness"][spring.joint().name()] = [float(spring.stiffness())]
                 rest = spring.nominal_angle() if hasattr(spring, "nominal_angle") else spring.nominal_position()
@@ -181,12 +183,6 @@ def _floating(path: str) -> set[str]:
     """Return the links of a URDF that float: Drake makes no joints of theirs, and leaves them free."""
     joints = [joint for joint in ElementTree.parse(path).getroot().findall("joint") if joint.get("type") == "floating"]
     return {child.get("link", "") for joint in joints for child in joint.findall("child")}
-
-
-def _index(k: int) -> Any:
-    from pydrake.multibody.tree import ForceElementIndex
-
-    return ForceElementIndex(k)
 
 
 def open_robot(path: str, urdf: bool) -> _Robot:

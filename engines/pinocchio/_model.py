@@ -493,7 +493,8 @@ def mechanics(scene: Scene, bodies: Bodies) -> dict[str, Any]:
 
 def _audit(scene: Scene, rows: PinRows, bodies: Bodies) -> dict[str, Any]:
     """What differs from the rows' own audit."""
-    on, to = rows_on(rows), bodies.to
+    on = tuple(int(Mode.COLLISION if fast else Mode.CONTACT) for fast in rows.fast)  # all just entered
+    to = bodies.to
     hidden = {"hidden": {"lam": ALL_AT_ONCE}} if isinstance(rows.ways, Gated) else {}
 
     def lam(q: Floats, v: Floats) -> Floats:
@@ -506,8 +507,3 @@ def _audit(scene: Scene, rows: PinRows, bodies: Bodies) -> dict[str, Any]:
         return to.velocities(r, rows.jacobian(r))
 
     return mechanics(scene, bodies) | {"H": H, "lam": lam} | hidden
-
-
-def rows_on(rows: PinRows) -> tuple[int, ...]:
-    """Return the modes of rows that have all just been entered."""
-    return tuple(int(Mode.COLLISION if fast else Mode.CONTACT) for fast in rows.fast)

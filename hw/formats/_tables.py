@@ -94,16 +94,13 @@ def places(tables: Iterable[Table]) -> dict[str, tuple[Table, int | None]]:
     return found
 
 
-def spans(rows: int) -> Iterator[tuple[int, int]]:
-    """Bounds of the blocks of that many rows."""
-    return ((a, min(a + BLOCK_ROWS, rows)) for a in range(0, rows, BLOCK_ROWS))
-
-
 def sliced(
     path: Path, what: str, group: Group, columns: Sequence[str], get: Callable[[str, int, int], NDArray[Any]]
 ) -> Iterator[Block]:
     """Blocks whose columns are read one by one; `get` gives the rows of a column by name, start and stop."""
-    for start, stop in spans(group.rows or 0):
+    rows = group.rows or 0
+    for start in range(0, rows, BLOCK_ROWS):
+        stop = min(start + BLOCK_ROWS, rows)
         block: Block = {}
         for name in columns:
             with parsing(path, what, start, name):

@@ -64,11 +64,6 @@ def see_by_hermite(model: Model, run: Trajectory, times: Floats) -> tuple[Floats
     return y, yd
 
 
-def plain_difference(y: Floats, yhat: Floats) -> Floats:
-    """Measured less predicted."""
-    return y - yhat
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Model:
     """A mechanism with what a rig measures of it.
@@ -119,7 +114,7 @@ class Model:
     read: Callable[[Model, Log], tuple[Floats, Floats | None]] = read_as_they_are
     see: Callable[[Model, Trajectory, Floats], tuple[Floats, Floats]] = see_by_hermite
     turns: tuple[int, ...] = ()
-    differ: Callable[[Floats, Floats], Floats] = plain_difference
+    differ: Callable[[Floats, Floats], Floats] = np.subtract
     engine: str = "reference"
     falls: int = -1
     restart: float = 0.0

@@ -74,7 +74,7 @@ def replay(
     restart = 0.0 if kind == "closed_loop" else restart
     cut = windows(log, chosen, restart, delay, horizon)
     if chosen.start_span and chosen.places:
-        cut = fitted_starts(chosen, numbers, cut, chosen.start_span)
+        cut = tuple(_fitted(chosen, numbers, window, chosen.start_span) for window in cut)
     predictions, skipped = [], {}
     for text in wanted:
         name, _, profile = text.partition(":")
@@ -140,16 +140,12 @@ ROUNDS = 2
 """Of Gauss and Newton with the first derivatives: few samples are all but linear in the start."""
 
 
-def fitted_starts(model: Model, numbers: Mapping[str, Value], cut: Sequence[Window], span: float) -> tuple[Window, ...]:
-    """The windows with starts that fit their first `span` seconds best, by the model and its recorded inputs.
+def _fitted(model: Model, numbers: Mapping[str, Value], window: Window, span: float) -> Window:
+    """The window with the start that fits its first `span` seconds best, by the model and its recorded inputs.
 
     A polynomial through the samples beside an instant knows nothing of the torques; at the first sample
     of a log, where there is none before it, its rate is tens of times noisier than that of the model.
     """
-    return tuple(_fitted(model, numbers, window, span) for window in cut)
-
-
-def _fitted(model: Model, numbers: Mapping[str, Value], window: Window, span: float) -> Window:
     count = max(2 * HALF, int(np.searchsorted(window.t - window.t[0], span)))
     short = _shortened(window, min(count, len(window.t)))
     problem = Exact(model, numbers, (), (short,), True, 1)

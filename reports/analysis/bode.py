@@ -46,13 +46,7 @@ class Curve:
 
 
 def soft_contact(kstar: float, mode: str = "grasp", **parameters: Value) -> Curve:
-    """The fingers and the block linearised about an equilibrium in one mode set.
-
-    Args:
-        kstar: gain of the tactile loop, cm/(s N).
-        mode: key of `MODES`.
-        parameters: of the case's variant `axis`, to change.
-    """
+    """The fingers and the block linearised about an equilibrium in one of `MODES`; the gain is in cm/(s N)."""
     from crossbody.reference.systems import soft_contact as mechanism
 
     case = cases.load(CASE, variant="axis", kstar=kstar, **parameters)

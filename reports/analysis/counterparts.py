@@ -41,14 +41,9 @@ NO_FRICTION = {
 
 
 def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Every way of every engine at every place.
+    """Every way of every engine at every equilibrium: one row a way, and one row a pole, 1/s.
 
-    Args:
-        found: places of one case; those without an equilibrium, and loops, are left out.
-        names: of engines; what one cannot do is a row with its sentence.
-
-    Returns:
-        One row a way, columns `COLUMNS`, and one row a pole, columns `POLE_COLUMNS`, 1/s.
+    What an engine cannot do is a row with its sentence.
     """
     rows: list[dict[str, Any]] = []
     poles: list[dict[str, Any]] = []

@@ -64,11 +64,7 @@ def response_figure(rows: pd.DataFrame) -> Figure:
 
 
 def bode_figure(rows: pd.DataFrame) -> Figure:
-    """What a hand that moves the soft fingers feels: a column an output, a line a gain of the tactile feedback.
-
-    Args:
-        rows: as `crossbody.reports.analysis.bode.table` gives them.
-    """
+    """What a hand that moves the soft fingers feels: a column an output, a line a gain of the feedback."""
     names = [f"finger velocity to {name}" for name in OUTPUTS]
     title = "Block held by two soft fingers, linearised in the grasp"
     panels = Panels(title, 620, rows=2, cols=len(OUTPUTS), heads=names)

@@ -46,11 +46,7 @@ class Family:
         return self._found[value]
 
     def model(self, k: int, value: float) -> LinearModel:
-        """Of place k.
-
-        Raises:
-            InvalidValue: where there is no such equilibrium.
-        """
+        """Of place k."""
         place = self.places(value)[k]
         if place.model is None:
             raise InvalidValue(f"There is no equilibrium {place.name!r} at {self.parameter} = {value:g}.")
@@ -58,11 +54,7 @@ class Family:
 
 
 def root_locus(family: Family, values: Sequence[float]) -> pd.DataFrame:
-    """Poles of every place, joined to branches: one row a pole.
-
-    Raises:
-        InvalidValue: where a place has no equilibrium at some value.
-    """
+    """Poles of every place, joined to branches: one row a pole."""
     parts = []
     for k, place in enumerate(family.places(values[0])):
         found = locus(lambda value, k=k: family.model(k, value), values)  # type: ignore[misc]
@@ -76,9 +68,6 @@ def limits(family: Family, values: Sequence[float]) -> pd.DataFrame:
     """Values between the given ones at which a place gains or loses its stability: columns `LIMITS`.
 
     `unstable` says on which side, `frequency` is that of the pole which crosses, rad/s.
-
-    Raises:
-        InvalidValue: where a place has no equilibrium at some value.
     """
     rows = [row for k in range(len(family.places(values[0]))) for row in _crossings(family, k, values)]
     return pd.DataFrame(rows, columns=list(LIMITS))

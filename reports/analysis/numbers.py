@@ -125,9 +125,6 @@ def workspace(
     Returns:
         Columns x, z, growth (largest real part, 1/s; NaN where the robot does not reach or is
         singular), unstable (number of poles to the right of 0).
-
-    Raises:
-        CaseUnsupported: for another mechanism.
     """
     if case.mechanism != "delta":
         raise CaseUnsupported(f"There is a map of the workspace for the delta robot, not for {case.mechanism!r}.")

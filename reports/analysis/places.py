@@ -79,15 +79,7 @@ def build(case: Case) -> System:
 
 
 def places(case: Case, at: Mapping[str, float] | None = None) -> tuple[Place, ...]:
-    """The equilibria of a case.
-
-    Args:
-        case: with its numbers.
-        at: where to look, for a mechanism that can stand in many places: x, y, z of the flange, m.
-
-    Raises:
-        UnknownName: for another coordinate than those.
-    """
+    """The equilibria of a case, of which some stand in many places: near x, y, z of the flange, m."""
     return tuple(PLACES.get(case.mechanism, _visited)(case, _known(case, at or {})))
 
 

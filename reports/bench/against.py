@@ -24,11 +24,7 @@ NEEDED = {"bench": [*RUNG, "error", "outcome"], "headline": [*LINE, "ratio"]}
 
 
 def read(base: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Timings and headline of an earlier benchmark.
-
-    Raises:
-        OutputError: if the folder holds none, or one of another version.
-    """
+    """Timings and headline of an earlier benchmark."""
     recover(base)
     if not base.is_dir():
         raise OutputError(f"--against {base} is not a folder; name one that crossbody bench wrote.")
@@ -53,11 +49,7 @@ def _table(path: Path) -> pd.DataFrame:
 
 
 def check_common(base_rows: pd.DataFrame, labels: Iterable[str]) -> None:
-    """Before anything is run: whether an earlier benchmark has one of these cases, under the same parameters.
-
-    Raises:
-        InvalidValue: naming what it has.
-    """
+    """Before anything is run: whether an earlier benchmark has one of these cases, under the same parameters."""
     known = base_rows["case"].unique().tolist()
     if not set(labels) & set(known):
         raise InvalidValue(f"--against: the earlier benchmark has none of these cases; it has: {', '.join(known)}.")
@@ -66,11 +58,7 @@ def check_common(base_rows: pd.DataFrame, labels: Iterable[str]) -> None:
 def lost(
     rows: pd.DataFrame, headline: pd.DataFrame, base_rows: pd.DataFrame, base_headline: pd.DataFrame
 ) -> pd.DataFrame:
-    """What was lost: one row a loss, columns case, engine, profile, what, before, now, why; empty if nothing was.
-
-    Raises:
-        InvalidValue: if both have no case, engine and setting in common.
-    """
+    """What was lost: one row a loss, columns case, engine, profile, what, before, now, why; empty if nothing was."""
     both = rows.merge(base_rows, on=RUNG, suffixes=("", "_before"))
     if not len(both):
         raise InvalidValue("--against: the two benchmarks have no case, engine and setting in common.")

@@ -14,11 +14,7 @@ APART = 1.0  # decades of error between two labels of a line, twice the decades 
 
 
 def work_precision(rows: pd.DataFrame) -> Figure:
-    """Log-log lines labelled with tolerance or step; a failed run is a cross at the right edge.
-
-    Args:
-        rows: as `crossbody.reports.bench.measure.bench` gives them.
-    """
+    """Log-log lines labelled with tolerance or step; a failed run is a cross at the right edge."""
     cases = ", ".join(rows["case"].unique())
     panels = Panels(f"Work against precision, {cases}; a cross is a run that failed", 560)
     error = rows["error"].astype(float)

@@ -39,11 +39,7 @@ def before_floor(settings: Sequence[float], errors: Sequence[float]) -> float:
 
 
 def orders(rows: pd.DataFrame) -> pd.DataFrame:
-    """One row an engine and profile on a case: observed and promised order, and in words what to think of it.
-
-    Args:
-        rows: as of `crossbody.reports.bench.measure.bench`.
-    """
+    """One row an engine and profile on a case: observed and promised order, and what to think of it."""
     found = []
     for (case, engine, profile, knob), group in rows.groupby(["case", "engine", "profile", "knob"], sort=False):
         settings, errors = group["setting"].to_list(), group["error"].to_list()

@@ -23,16 +23,9 @@ Row = dict[str, Any]
 def ratio(
     what: str, value: float, limit: float | None, beside: str, how: str, unit: str = "1", least: bool = False
 ) -> Row:
-    """A row of a table of ratios and counts.
+    """A row of ratios and counts: what, its value, a largest or least limit, and what it is made of.
 
-    Args:
-        what: in words.
-        value: what it is.
-        limit: largest value, or least; None where it is only stated.
-        beside: the numbers that the value is made of.
-        how: what leaves it out, or makes it quick.
-        unit: of the value.
-        least: whether the limit is the least value.
+    `how` says what leaves it out, or makes it quick; without a limit it is only stated.
     """
     held = limit is None or (value >= limit if least else not value > limit)
     given = np.nan if limit is None else limit
@@ -188,13 +181,9 @@ LEVERS: tuple[Callable[[int], Iterator[Row]], ...] = (_rings, _idle_balls, _reco
 
 
 def measure(repeats: int) -> pd.DataFrame:
-    """One row a lever: what it costs to have what a scene does not need.
+    """One row a lever: what it costs to have what a scene does not need, by the shortest of repeated runs.
 
-    Args:
-        repeats: interleaved runs of each, the shortest of which counts.
-
-    Returns:
-        value and limit are ratios or counts; held is whether the value is within its limit
-        (always, without one).
+    value and limit are ratios or counts; held is whether the value is within its limit, if there is
+    one.
     """
     return pd.DataFrame([row for lever in LEVERS for row in lever(repeats)], columns=COLUMNS)

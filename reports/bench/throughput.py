@@ -60,12 +60,7 @@ def mujoco(count: int, threads: int, integrator: str = "Euler") -> float:
     """Runs a second of the same drops by MuJoCo's batch, stepped in its own threads at 1 ms.
 
     Its batch takes no Python callback, so the cubic part of the law is missing: this is less work
-    than the case's.
-
-    Args:
-        count: runs.
-        threads: of the batch.
-        integrator: "Euler", MuJoCo's own and fastest, or "RK4".
+    than the case's. Its integrator is "Euler", MuJoCo's own and fastest, or "RK4".
     """
     import mujoco as mj
     from mujoco import batch
@@ -113,11 +108,7 @@ def best_pair(
 
 
 def against_mujoco(repeats: int, integrator: str) -> Row:
-    """Median of the interleaved ratios.
-
-    Raises:
-        EngineUnavailable: without MuJoCo.
-    """
+    """Median of the interleaved ratios."""
     cores = len(os.sched_getaffinity(0))
     pairs = [(reference(RUNS, cores), mujoco(BATCH, cores, integrator)) for _ in range(repeats)]
     a, b = (statistics.median(side) for side in zip(*pairs, strict=True))

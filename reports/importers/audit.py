@@ -62,15 +62,7 @@ class Audit:
 def audited(
     path: Path, engines: Sequence[str], without: str = "", seconds: float = SECONDS, audit: Audit | None = None
 ) -> Iterator[tuple[Audit, str, list[Row]]]:
-    """Return the audit, and of each importer its rows, as they are there.
-
-    Args:
-        path: of the file.
-        engines: names of importers.
-        without: what is left out of the yardstick, as of a case.
-        seconds: what an importer may take.
-        audit: of the file, where what it says is known already.
-    """
+    """Return the audit, and of each importer its rows, as they are there, within so many seconds each."""
     check_text(path)
     left_out = _left_out(path, without)
     with TemporaryDirectory(prefix="crossbody-audit-") as folder:

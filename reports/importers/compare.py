@@ -118,11 +118,9 @@ class Said:
     def excuse(self, words: str, names: Set[str]) -> str:
         """Return the line in which it says that it leaves something out; empty where none does.
 
-        A line that names parts, or the line of the file where they stand, excuses these alone.
-
-        Args:
-            words: pattern of what it speaks of.
-            names: of the part that differs, and of its body; empty for the whole.
+        A line that names parts, or the line of the file where they stand, excuses these alone. The
+        words are a pattern of what it speaks of; the names are of the part that differs and of its
+        body.
         """
         for line in self.lines:
             if words and SAID.search(line) and re.search(rf"\b({words})s?\b", line, re.I):

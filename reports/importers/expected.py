@@ -85,7 +85,10 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
         "shapes": [[shape.name, "mesh" if shape.corners else shape.type, by.get(shape.body, ""),
                     _boxes(shape, frames[0], moved.get(by.get(shape.body, "")))] for shape in solids],
         "contacts": [[numbers[pair.first], numbers[pair.second]] for pair in pairs],
-        "surfaces": [_surface(pair) for pair in pairs],
+        "surfaces": [
+            [*(mu if k < pair.dimension - 1 else 0.0 for k, mu in enumerate(pair.friction)), pair.margin]
+            for pair in pairs
+        ],
         "softness": _softness(scene, pairs),
         "inertias": _inertias(scene, frames[0]),
         "keys": {name: [np.concatenate(q).tolist()] * 2 for name, q in job["keys"].items()},
@@ -96,11 +99,6 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
 def _standing(frame: Any, position: Sequence[float], orientation: Sequence[float]) -> tuple[Floats, Floats]:
     p, R = map(np.array, frame)
     return p + R @ np.array(position), R @ matrices(np.array(orientation))
-
-
-def _surface(pair: Pair) -> list[float]:
-    """Return the friction of a pair that is in force, and its margin."""
-    return [*(mu if k < pair.dimension - 1 else 0.0 for k, mu in enumerate(pair.friction)), pair.margin]
 
 
 def _softness(scene: Scene, pairs: Sequence[Pair]) -> dict[str, list[float]]:

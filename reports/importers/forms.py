@@ -21,6 +21,9 @@ from crossbody.cases.regular import open_regular
 
 Node = ElementTree.Element
 Place = tuple[Path, int]
+NAMED_BY = ("name", "joint", "joint1", "body1", "tendon")  # what of an element names a part
+LEVELS = 4  # folders above a file that are there for its meshes
+Change = Callable[[Node, Mapping[Node, Place]], None]
 
 
 def with_lines(path: Path, folder: Path | None = None) -> tuple[Node, dict[Node, Place]]:
@@ -80,17 +83,8 @@ def named(path: Path) -> dict[int, dict[str, set[str]]]:
         if file == path and node.tag not in ("worldbody", "mujoco", "robot", "default", "compiler", "option"):
             parts = {node} if node.get("name") else {node, around.get(node, node)}
             here = found.setdefault(line, {}).setdefault(node.tag, set())
-            here.update(name for one in parts for name in own_names(one))
+            here.update(name for one in parts for key in NAMED_BY if (name := one.get(key)))
     return found
-
-
-def own_names(node: Node) -> set[str]:
-    """Return the names that an element says."""
-    return {node.get(key, "") for key in ("name", "joint", "joint1", "body1", "tendon")} - {""}
-
-
-LEVELS = 4  # folders above a file that are there for its meshes
-Change = Callable[[Node, Mapping[Node, Place]], None]
 
 
 class Forms:

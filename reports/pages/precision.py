@@ -102,7 +102,9 @@ def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
             "type": "scatter", "mode": "markers+text",
             "x": [max(error, FLOOR) if math.isfinite(error) else edge], "y": [ms],
             "name": plain(who), "meta": who, "text": [plain(who)],
-            "textposition": _side(error, edge), "textfont": {"size": 11}, "cliponaxis": False,
+            # names stand inside the plot
+            "textposition": "middle left" if not math.isfinite(error) or error > 1e-4 * edge else "middle right",
+            "textfont": {"size": 11}, "cliponaxis": False,
             "marker": {"size": 10, "color": COLOURS[i % len(COLOURS)],
                        "symbol": SYMBOLS[i % len(SYMBOLS)] if math.isfinite(error) else "x"},
         }
@@ -120,8 +122,3 @@ def _decades(title: str, values: Sequence[float]) -> dict[str, Any]:
     """A logarithmic axis; of more than a decade, labelled at whole ones alone."""
     wide = bool(values) and max(values) > 20.0 * min(values)
     return {"type": "log", "title": {"text": title}, "exponentformat": "power"} | ({"dtick": 1} if wide else {})
-
-
-def _side(error: float, edge: float) -> str:
-    """Names stand inside the plot."""
-    return "middle left" if not math.isfinite(error) or error > 1e-4 * edge else "middle right"

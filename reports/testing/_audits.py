@@ -37,11 +37,7 @@ class Audits(pytest.Collector):
     """All files asked for."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """One test a file, engine and quantity; nothing is read yet.
-
-        Raises:
-            CollectError: for an engine that has no importer, or a file that is not there.
-        """
+        """One test a file, engine and quantity; nothing is read yet."""
         typed = self.config.getoption("--crossbody-audit")
         base = self.config.invocation_params.dir if typed else self.config.rootpath
         given = self.config.getoption("--crossbody-engine") or self.config.getini("crossbody_engines")

@@ -65,11 +65,7 @@ class OneCase(pytest.Collector):
         self.scene = scene
 
     def collect(self) -> Iterator[pytest.Item]:
-        """One test for every number that is judged; nothing is run yet.
-
-        Raises:
-            CollectError: for a case that cannot be built, in one sentence.
-        """
+        """One test for every number that is judged; nothing is run yet."""
         bench = plugin.bench(self.config)
         try:
             case = bench.case(self.scene)

@@ -45,11 +45,7 @@ class Named:
 
 
 def scenes(config: pytest.Config, mark: pytest.Mark | None = None) -> list[Any]:
-    """Every variant of every case asked for; one skipped parameter where there is none.
-
-    Raises:
-        CollectError: for a case or variant that does not exist, in one sentence.
-    """
+    """Every variant of every case asked for; one skipped parameter where there is none."""
     texts = mark.args if mark is not None and mark.args else _asked(config, "case")
     try:
         found = [scene for text in texts for scene in _variants(*parted(str(text)), _base(config, mark))]
@@ -59,11 +55,7 @@ def scenes(config: pytest.Config, mark: pytest.Mark | None = None) -> list[Any]:
 
 
 def picks(config: pytest.Config, mark: pytest.Mark | None = None) -> list[Named]:
-    """Every profile of every engine asked for; those that `crossbody run` takes where none is named.
-
-    Raises:
-        CollectError: for an engine or profile that does not exist, in one sentence.
-    """
+    """Every profile of every engine asked for; those that `crossbody run` takes where none is named."""
     texts = mark.kwargs.get("engines", ()) if mark is not None else ()
     try:
         return [Named(pick) for pick in choice.picks(texts or _asked(config, "engine"))]

@@ -124,12 +124,10 @@ class Fall:
     @cached_property
     def rotation(self) -> float:
         """Time from the first touch until the box is level, s."""
-
-        def slowness(s: float) -> float:
-            """dt/ds with th = tilt - s^2, which is smooth even where the turning starts from rest."""
-            return -2.0 * s / self.turning(self.tilt - s * s)
-
-        return quad(slowness, 0.0, math.sqrt(self.tilt), epsabs=0.0, epsrel=1e-12)[0]
+        # With th = tilt - s^2, dt/ds is smooth even where the turning starts from rest.
+        return quad(
+            lambda s: -2.0 * s / self.turning(self.tilt - s * s), 0.0, math.sqrt(self.tilt), epsabs=0.0, epsrel=1e-12
+        )[0]
 
     @cached_property
     def blow(self) -> float:

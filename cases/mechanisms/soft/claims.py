@@ -181,19 +181,13 @@ _RUNS: dict[tuple[str, float], dict[str, float]] = {
 """(variant, k*) -> what a run with the other parameters at their defaults shows."""
 
 
-def _preset(
-    given: Mapping[str, Value], table: Mapping[str, Parameter], variant: Mapping[str, Value]
-) -> bool:  # fmt: skip
-    """Whether all but k* is as the variant sets it."""
-    return all(given[k] == variant.get(k, p.default) for k, p in table.items() if k != "kstar")
-
-
 def claims(
     variant: str, given: Mapping[str, Value], table: Mapping[str, Parameter], preset: Mapping[str, Value]
 ) -> tuple[Claim, ...]:
     """The numbers of the run, void once a parameter but k* is changed."""
     k = float(given["kstar"])
-    found = _RUNS.get((variant, k), {}) if _preset(given, table, preset) else {}
+    as_set = all(given[k] == preset.get(k, p.default) for k, p in table.items() if k != "kstar")
+    found = _RUNS.get((variant, k), {}) if as_set else {}
     told = [Claim(metric=m, expected=x, tier=Tier.B, source=_PROTOTYPE) for m, x in found.items()]
     return (*told, *_ends(variant, k, given), Claim(metric="tactile_invariant", expected=0.0, tier=Tier.A, source=(
         "x_ref + k (mb b' + bt (b - b0)) + k (y_R - y_L)/ks is constant"
