@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from crossbody.cases.arrays import Floats
 from crossbody.cases.trajectory import Trajectory
 
+CROSSINGS = 3
+PARTS = 16  # points looked at from each sample to the next
+
 
 def pieces(starts: Floats, t: Floats) -> NDArray[np.intp]:
     """Index of the piece of each time (n,): before an end, and behind it if the time stands again.
@@ -23,9 +26,6 @@ def pieces(starts: Floats, t: Floats) -> NDArray[np.intp]:
     return np.clip(np.where(again, after, before), 0, None)
 
 
-CROSSINGS = 3
-
-
 def period(t: Floats, x: Floats) -> float | None:
     """Return the mean time between upward crossings of x(t) = 0, s; None below `CROSSINGS` of them."""
     i = np.flatnonzero((x[:-1] < 0.0) & (x[1:] >= 0.0))
@@ -33,9 +33,6 @@ def period(t: Floats, x: Floats) -> float | None:
         return None
     crossed = t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i])
     return float(crossed[-1] - crossed[0]) / (len(i) - 1)
-
-
-PARTS = 16  # points looked at from each sample to the next
 
 
 def between(run: Trajectory) -> Callable[[Floats], Trajectory]:

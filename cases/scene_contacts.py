@@ -38,6 +38,8 @@ WIDEST, SAG, LEVEL = 1e-2, 1e-8, 1e-6
 """Largest sine at which capsules lie along each other; and of the sum of two capsules' radii, by
 how much their gap may be too large that is taken where they end. Last, the largest tilt with
 which a cylinder stands."""
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+"""Of a loop in space: its points, then its axes; of a joint its velocities."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -310,10 +312,6 @@ def _places(one: Shape, two: Shape) -> int:
     if two.type != "hull":
         return most
     return len(two.corners) if len(two.corners) <= most else 0
-
-
-COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
-"""Of a loop in space: its points, then its axes; of a joint its velocities."""
 
 
 def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:

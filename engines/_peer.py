@@ -24,6 +24,9 @@ Crossing = tuple[int, float, Floats, Floats, int]
 """Before which sample, when (s), q and v there, and the row whose gap is zero; -1 where a force turns."""
 OPEN = float(np.finfo(np.float64).tiny)
 """Gap of a row at the instant at which it comes free, m: no more than a sign."""
+_SCALAR = "Bodies on a line alone are compared: masses, gravity and constants say all."
+LEAST_PUSH = 1e-9  # an impulse below this part of the momentum that a body has is none
+STEPS = Parameter(default=2_000_000, doc="bound on the number of steps", low=1, high=1e9)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -46,7 +49,6 @@ class PeerRun(Run):
         return self.physics
 
 
-_SCALAR = "Bodies on a line alone are compared: masses, gravity and constants say all."
 HIDDEN: Mapping[str, Mapping[str, str]] = {
     "*": {"ledger": "Its steps keep no account of the work of its forces."}
     | dict.fromkeys(("M", "bias", "H", "lam", "constants"), _SCALAR)
@@ -159,10 +161,6 @@ def ended(line: Line, q: Floats, v: Floats) -> Outcome:
     if not (np.isfinite(q).all() and np.isfinite(v).all()):
         return Outcome.NOT_FINITE
     return Outcome.DIVERGED if np.max(np.abs(v)) > 1e3 * line.fastest else Outcome.FINISHED
-
-
-LEAST_PUSH = 1e-9  # an impulse below this part of the momentum that a body has is none
-STEPS = Parameter(default=2_000_000, doc="bound on the number of steps", low=1, high=1e9)
 
 
 class Stepper(Protocol):

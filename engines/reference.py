@@ -24,6 +24,20 @@ from crossbody.reference.start import NOT_FOUND, OffRowsError
 
 DEPENDENT = 1e6
 """Condition of H M^-1 H^T beyond which rounding parts two engines' multipliers by over 1e-9."""
+OF_THE_CASE = "case"
+_ROBOT = (
+    "IDA goes through, but factorises 24 unknowns for every step and begins anew at every tick of a "
+    "controller; CVODE is the independent check on the robot, and simulate(..., solver='ida') runs it."
+)
+UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
+"""(mechanism, solver) -> why it is not run."""
+KEPT = "kept"
+TRACED = {KEPT: None, "yes": True, "no": False}
+"""Which code of a scene's sweeps is taken: compiled for this model before, now if need be; none."""
+_ROWS, _STATE = re.compile(r"\b[Rr]ows? \[(\d+(?:, \d+)*)\]"), re.compile(r", q = \[[^]]*\], v = \[[^]]*\]")
+LONG = 16  # most numbers of a state that a message shows
+ROUNDING = 1e-12  # change of a coordinate that is none
+SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
 def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
@@ -66,22 +80,6 @@ def audit(system: System, q0: Floats, v0: Floats) -> dict[str, Any]:
 def listed(scene: Scene) -> dict[str, Any]:
     """Return masses, kg, and gravity, m/s^2, of a scene."""
     return {"masses": masses(scene), "gravity": float(np.linalg.norm(scene.gravity))}
-
-
-OF_THE_CASE = "case"
-_ROBOT = (
-    "IDA goes through, but factorises 24 unknowns for every step and begins anew at every tick of a "
-    "controller; CVODE is the independent check on the robot, and simulate(..., solver='ida') runs it."
-)
-UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
-"""(mechanism, solver) -> why it is not run."""
-KEPT = "kept"
-TRACED = {KEPT: None, "yes": True, "no": False}
-"""Which code of a scene's sweeps is taken: compiled for this model before, now if need be; none."""
-_ROWS, _STATE = re.compile(r"\b[Rr]ows? \[(\d+(?:, \d+)*)\]"), re.compile(r", q = \[[^]]*\], v = \[[^]]*\]")
-LONG = 16  # most numbers of a state that a message shows
-ROUNDING = 1e-12  # change of a coordinate that is none
-SWITCHES = ("ledger", "shortcuts", "implicit")
 
 
 @dataclass(slots=True, kw_only=True)

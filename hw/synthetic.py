@@ -28,6 +28,8 @@ from crossbody.hw.reading.units import to_si
 from crossbody.reference.delta import scene
 
 NAMES = ("torque 1 [N m]", "torque 2 [N m]", "torque 3 [N m]", "force x [N]", "force y [N]", "force z [N]")
+ABOUT = "SYNTHETIC, no measurement: delta robot in MuJoCo"
+MOTORS = (0, 3, 6)
 
 
 @checked_fields
@@ -133,10 +135,6 @@ def _forces(case: Case, ticks: Floats) -> Floats:
         for t, value in zip(case.inputs.times, case.inputs.values, strict=True):
             force[ticks >= t - 1e-12] = value[3:]
     return force
-
-
-ABOUT = "SYNTHETIC, no measurement: delta robot in MuJoCo"
-MOTORS = (0, 3, 6)
 
 
 @checked_fields

@@ -41,6 +41,20 @@ PARAMETERS = {
     "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
+ENTRIES = {
+    "free": ((*"xyz", "qw", "qx", "qy", "qz"), ("m",) * 3 + ("1",) * 4),
+    "ball": (("qw", "qx", "qy", "qz"), ("1",) * 4),
+    "slide": (("",), ("m",)),
+    "hinge": (("",), ("rad",)),
+}
+RATES = ENTRIES | {
+    "free": ((*"xyz", "rx", "ry", "rz"), ("m",) * 3 + ("rad",) * 3),
+    "ball": (("rx", "ry", "rz"), ("rad",) * 3),
+}
+"""Names and units of the positions and of the velocities of each kind of joint."""
+ROUNDS = 50
+CLOSED = 1e-13  # m or rad: rounding of a gap
+DEPENDENT = 1e-9  # singular value of the rows, over the largest, that counts as zero
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,19 +234,6 @@ def check_runnable(scene: Scene) -> None:
             )
 
 
-ENTRIES = {
-    "free": ((*"xyz", "qw", "qx", "qy", "qz"), ("m",) * 3 + ("1",) * 4),
-    "ball": (("qw", "qx", "qy", "qz"), ("1",) * 4),
-    "slide": (("",), ("m",)),
-    "hinge": (("",), ("rad",)),
-}
-RATES = ENTRIES | {
-    "free": ((*"xyz", "rx", "ry", "rz"), ("m",) * 3 + ("rad",) * 3),
-    "ball": (("rx", "ry", "rz"), ("rad",) * 3),
-}
-"""Names and units of the positions and of the velocities of each kind of joint."""
-
-
 def coordinates(scene: Scene, entries: Any = ENTRIES) -> tuple[Coordinate, ...]:
     """Return names and units of q, or of v by `RATES`."""
     return tuple(
@@ -293,11 +294,6 @@ AS_IT_STANDS = (
     ),
 )  # fmt: skip
 """Of what an engine makes of a file by itself: its reader is judged, what it computes is told."""
-
-
-ROUNDS = 50
-CLOSED = 1e-13  # m or rad: rounding of a gap
-DEPENDENT = 1e-9  # singular value of the rows, over the largest, that counts as zero
 
 
 def assembled(model: Any, q: Floats, v: Floats) -> tuple[Floats, Floats]:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 SUFFIXES = (".xml", ".urdf")
 HEAD = 4096
 """Bytes in which the root of a file must begin, behind comments that are longer it is taken for MJCF."""
+BYTES = 50_000_000  # of a file
+BODIES = ("body", "link")
 
 
 def existing(path: Path) -> Path:
@@ -64,10 +66,6 @@ def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
 def findings_of(path: Path) -> list[str]:
     """Return sentences on what is strange in a file to us, not to its compiler, but is taken as it stands."""
     return urdf.findings(path) if is_urdf(path) else []
-
-
-BYTES = 50_000_000  # of a file
-BODIES = ("body", "link")
 
 
 def check_text(path: Path) -> None:

@@ -32,6 +32,9 @@ from crossbody.engines.drake._scene import SceneRun
 from crossbody.engines.drake._simulate import Sim
 
 THICK = 10.0  # sides of the box that stands for a plane, m
+SCHEMES = ("runge_kutta5", "runge_kutta3", "bogacki_shampine3", "radau3")
+USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4  # what a Simulator of 1.51.1 starts with
+RUBS = RIGID, "Contacts of a discrete plant are its own, and solved for within a step."
 
 
 def plant(scene: Line, dt: float) -> tuple[Any, Any]:
@@ -90,11 +93,6 @@ def _multiplier(scene: Line, row: int, q: list[Any], v: list[Any]) -> Any:
     a0, a1, a2, m, w = (float(a[row]) for a in (scene.a0, scene.a1, scene.a2, scene.reduced, scene.presses))
     lam = m * (w - a1 * hd - a0 * h - a2 * h * h * h)
     return if_then_else(h > 0.0, Expression(0.0), larger(lam, Expression(0.0))) if scene.unilateral[row] else lam
-
-
-SCHEMES = ("runge_kutta5", "runge_kutta3", "bogacki_shampine3", "radau3")
-USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4  # what a Simulator of 1.51.1 starts with
-RUBS = RIGID, "Contacts of a discrete plant are its own, and solved for within a step."
 
 
 def _runner(case: Case, scene: Line, sim: Sim, max_steps: int, dt: float) -> Callable[[], Trajectory]:

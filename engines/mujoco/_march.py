@@ -32,6 +32,10 @@ WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
 
 OUTLIVING = WATCHED | dict.fromkeys((CONTACT, COLLISION), ((1, 1.0),))
 """Of rows that push above their surface too until their multiplier is zero, as the law has it."""
+STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)  # as its own type it costs three times the copy
+"""time, qpos, qvel, act, ...: what a step starts from, inputs apart."""
+ROUNDS = 20  # of rows that open and close each other at one instant
+SAME_INSTANT = 100  # events in a row without the time moving on that make a cycle
 
 
 def signs(modes: Modes, watched: Mapping[int, tuple[tuple[int, float], ...]] = WATCHED) -> list[Sign]:
@@ -109,10 +113,6 @@ class Locator:
             mujoco.mj_forward(self.model, self.data)
 
 
-STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)  # as its own type it costs three times the copy
-"""time, qpos, qvel, act, ...: what a step starts from, inputs apart."""
-
-
 class Tape(Log):
     """One row an instant; the last row is also the state to which a step returns that overran an event.
 
@@ -143,10 +143,6 @@ class Tape(Log):
         """Times (n,), qpos (n, nq), qvel (n, nv)."""
         nq, nv, rows = self.model.nq, self.model.nv, self.rows[: self.n]
         return rows[:, 0], rows[:, 1 : 1 + nq], rows[:, 1 + nq : 1 + nq + nv]
-
-
-ROUNDS = 20  # of rows that open and close each other at one instant
-SAME_INSTANT = 100  # events in a row without the time moving on that make a cycle
 
 
 def integrator(model: Any, data: Any) -> Callable[[], None]:

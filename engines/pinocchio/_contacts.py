@@ -18,6 +18,8 @@ from crossbody.engines._machines import ACTIVE
 from crossbody.engines.nearest import Pose, cross
 
 WORLD = pin.LOCAL_WORLD_ALIGNED
+BACK = 1e-6
+"""Part of what separates both ways by which shapes go on first: rounding turns none back."""
 
 
 class ContactRows:
@@ -213,10 +215,6 @@ class Points:
         carrier, pose = self.placed[body]
         world = self.data.oMi[carrier] * pose
         return world.rotation, world.translation
-
-
-BACK = 1e-6
-"""Part of what separates both ways by which shapes go on first: rounding turns none back."""
 
 
 class Ways:

@@ -20,6 +20,8 @@ from crossbody.hw.fitting.search import TimeOver
 DIFFERENT = 0.01  # probability, shared among all parameters, below which halves do not agree
 UNLIKE = 5.0  # ratio of standard deviations from which on one half tells too little to be compared
 FEWEST = 8  # samples of a channel in a half
+UNLIKELY = 0.01  # probability, shared among all parameters, below which measured starts are refuted
+SPAN, POINTS = 3.0, 9  # standard deviations on either side, and values in all (odd: one is the estimate)
 
 
 def agreement(
@@ -88,9 +90,6 @@ def _half(
     return step, spread.std, spread.freedom, known & (len(residual) > told.basis.shape[1])
 
 
-UNLIKELY = 0.01  # probability, shared among all parameters, below which measured starts are refuted
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Move:
     """How free starts would move one estimate.
@@ -144,9 +143,6 @@ def _projected(joint: Exact, j: int, z: Floats, loose: NDArray[np.int64]) -> tup
     U = information(start, np.maximum(np.linalg.norm(start, axis=0), 1e-300) ** -1.0).basis
     J, r = block[:, loose], joint.residual_of(j, z)
     return J - U @ (U.T @ J), r - U @ (U.T @ r)
-
-
-SPAN, POINTS = 3.0, 9  # standard deviations on either side, and values in all (odd: one is the estimate)
 
 
 def profiles(

@@ -15,6 +15,9 @@ from scipy.optimize import least_squares
 from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.information import information, to_keep, unseen_by
 
+NOISE = 1e-6
+"""Of the sum of squares that one residual has in the mean: what the search still gains when it ends."""
+
 
 class TimeOver(Exception):  # noqa: N818 - no error: it ends an identification
     """The time for all of it is over."""
@@ -30,10 +33,6 @@ class Deadline:
         """Go on, or stop."""
         if time.monotonic() > self._end:
             raise TimeOver
-
-
-NOISE = 1e-6
-"""Of the sum of squares that one residual has in the mean: what the search still gains when it ends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

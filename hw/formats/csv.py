@@ -29,6 +29,10 @@ COLUMN = 30_000  # bytes that it takes for each column while it parses: 19,000 w
 HEAD = 4096  # bytes that tell the encoding
 EXACT = 2**53  # beyond, an integer is no float64
 MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "NA", "N/A"]
+LINE = 1 << 20  # characters; a longer line is no table
+CELL = 40  # characters of an offending cell that are shown
+COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
+FORMULA = ("=", "+", "-", "@")
 
 
 class Options(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -198,12 +202,6 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-LINE = 1 << 20  # characters; a longer line is no table
-CELL = 40  # characters of an offending cell that are shown
-COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
-FORMULA = ("=", "+", "-", "@")
 
 
 def find_fault(

@@ -23,6 +23,15 @@ from crossbody.hw.reading.clock_guess import ClockGuess, guess_clock, last_word,
 from crossbody.hw.reading.columns import Columns, Role, Signal, Time, dump_columns, load_columns, safe_name
 from crossbody.hw.reading.units import to_si
 
+PATTERNS = (
+    (Role.VELOCITIES, r"(v|w|dq|qd|dth|vel|velocity|omega|rate|speed)\w{0,3}(\[\d+\])?"),
+    (Role.COORDINATES, r"(q|th|theta|phi|angle|pos|position|enc|encoder)\w{0,3}(\[\d+\])?|[xyz]\d?|p[xyz]"),
+    (Role.INPUTS, r"(u|tau|torque|cmd|command|effort)\w{0,3}(\[\d+\])?"),
+    (Role.REFERENCES, r"(r|ref|reference|target|setpoint|des|desired)\w{0,3}(\[\d+\])?"),
+)
+USUAL = {Role.COORDINATES: "rad", Role.VELOCITIES: "rad/s", Role.INPUTS: "N m", Role.REFERENCES: "1", Role.SENSORS: "1"}
+ADMITTED = {Role.COORDINATES: ("rad", "m", "1"), Role.VELOCITIES: ("rad/s", "m/s", "1/s")}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ColumnSurvey:
@@ -198,16 +207,6 @@ def _column(column: Column, check: ValueCheck) -> ColumnSurvey:
 def largest(groups: Sequence[GroupSurvey]) -> GroupSurvey:
     """The group to begin with: one that has a clock, then the one with most numbers."""
     return max(groups, key=lambda g: (g.clock is not None or g.group.step > 0.0, g.rows * len(g.columns)))
-
-
-PATTERNS = (
-    (Role.VELOCITIES, r"(v|w|dq|qd|dth|vel|velocity|omega|rate|speed)\w{0,3}(\[\d+\])?"),
-    (Role.COORDINATES, r"(q|th|theta|phi|angle|pos|position|enc|encoder)\w{0,3}(\[\d+\])?|[xyz]\d?|p[xyz]"),
-    (Role.INPUTS, r"(u|tau|torque|cmd|command|effort)\w{0,3}(\[\d+\])?"),
-    (Role.REFERENCES, r"(r|ref|reference|target|setpoint|des|desired)\w{0,3}(\[\d+\])?"),
-)
-USUAL = {Role.COORDINATES: "rad", Role.VELOCITIES: "rad/s", Role.INPUTS: "N m", Role.REFERENCES: "1", Role.SENSORS: "1"}
-ADMITTED = {Role.COORDINATES: ("rad", "m", "1"), Role.VELOCITIES: ("rad/s", "m/s", "1/s")}
 
 
 def draft(found: Survey) -> Columns:

@@ -30,6 +30,8 @@ from crossbody.hw.windows.rates import HALF
 from crossbody.hw.windows.window import Window, run_window, windows
 
 KINDS = ("forward", "closed_loop")
+ROUNDS = 2
+"""Of Gauss and Newton with the first derivatives: few samples are all but linear in the start."""
 
 
 @checked_arguments
@@ -134,10 +136,6 @@ def _seen(model: Model, run: Trajectory, window: Window) -> tuple[Floats, Floats
     each = [model.see(model, run, np.ascontiguousarray(age)) for age in window.age.T]
     y, yd = (np.column_stack([pair[j][:, i] for i, pair in enumerate(each)]) for j in (0, 1))
     return y, yd
-
-
-ROUNDS = 2
-"""Of Gauss and Newton with the first derivatives: few samples are all but linear in the start."""
 
 
 def _fitted(model: Model, numbers: Mapping[str, Value], window: Window, span: float) -> Window:

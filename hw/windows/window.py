@@ -23,6 +23,7 @@ from crossbody.reference import simulate
 FEWEST = 8  # samples of a window
 SAME = 1e-6  # of a sample: two times this near are one
 BESIDE = 3  # samples on each side of an impact at which no polynomial through neighbours gives a rate
+REFERENCE = {"rtol": 1e-8}  # settings of the reference: far below what a rig measures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -155,9 +156,6 @@ def overlap(cut: Sequence[Window]) -> int:
             count, last = count + 1, other.t[0]
         found = max(found, count)
     return found
-
-
-REFERENCE = {"rtol": 1e-8}  # settings of the reference: far below what a rig measures
 
 
 def run_once(case: Case, solver: str, **options: Any) -> Trajectory:

@@ -20,6 +20,7 @@ STROKES = {"solid": "none", "dash": "7 4", "dot": "2 3", "dashdot": "7 3 2 3"}
 """The same dashes as lengths, for what plotly does not draw."""
 LEVEL = "#8a8a8a"
 """Of limits and zero lines: seen on light and on dark pages."""
+ACROSS = 0.09  # between two columns, part of the width
 
 
 def label(trace: Trace) -> str:
@@ -50,9 +51,6 @@ def coded(array: Floats) -> dict[str, str]:
     text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
     shape = {"shape": ",".join(map(str, array.shape))} if array.ndim > 1 else {}
     return {"dtype": f"f{array.itemsize}", "bdata": text} | shape
-
-
-ACROSS = 0.09  # between two columns, part of the width
 
 
 class Panels:

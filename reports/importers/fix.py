@@ -37,6 +37,11 @@ STATES, LIKE = 3, 1e-7
 """States at which places are compared, and how far they may be apart, m; meshes have single precision."""
 SPHERE, BOX, ROUND = 2, 6, (0, 3, 5)
 """Types of shapes: those in ROUND (plane, capsule, cylinder) are the same however turned about their axis."""
+SAME = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "armature", "damping", "springs", "limits",
+        "friction", "effort", "loops", "actuators", "contacts", "surfaces", "softness", "keyframes")  # fmt: skip
+"""What the new file means as the old one does; bodies that are fixed to the world may have other frames."""
+MARK = "Written by the option fix of crossbody audit"
+"""What a file begins with that may be written over; no comment of XML may have two dashes."""
 
 
 def check_model(path: Path, half: Path) -> None:
@@ -83,13 +88,6 @@ def _same(old: Floats, new: Floats) -> bool:
         return True
     off = np.abs(old[:, None] - new[None]).max(axis=2) / (1.0 + np.abs(old).max())
     return bool((off.min(axis=0) < LIKE).all() and (off.min(axis=1) < LIKE).all())
-
-
-SAME = ("coordinates", "inertia", "M", "gravity", "bias", "energy", "armature", "damping", "springs", "limits",
-        "friction", "effort", "loops", "actuators", "contacts", "surfaces", "softness", "keyframes")  # fmt: skip
-"""What the new file means as the old one does; bodies that are fixed to the world may have other frames."""
-MARK = "Written by the option fix of crossbody audit"
-"""What a file begins with that may be written over; no comment of XML may have two dashes."""
 
 
 def fixed(path: Path, out: Path, without: str = "") -> None:

@@ -11,6 +11,19 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 
+NUMBERS = {
+    "armature": ("armature",), "damping": ("damping", "damping v|v|", "damping v^3"),
+    "springs": ("stiffness", "stiffness x^2", "stiffness x^3", "rest"), "limits": ("lower", "upper"),
+    "friction": ("friction",), "effort": ("least force", "most force"),
+}  # fmt: skip
+"""Quantity -> numbers of joints that make it up."""
+USUAL = {"lower": -math.inf, "upper": math.inf, "least force": -math.inf, "most force": math.inf}
+"""What such a number is where nothing is said; of others 0."""
+SINGLE = 1e-6
+"""Part of the reach within which corners of meshes are the same: both have them in single precision."""
+PARTS = ("slide", "slide", "spin", "roll", "roll", "margin")
+"""Of a pair that may touch: friction along two tangents, about the normal and about them, margin."""
+
 
 @dataclass(frozen=True, slots=True)
 class Gap:
@@ -51,16 +64,6 @@ def apart(x: float, y: float) -> float:
     if x == y:
         return 0.0
     return abs(x - y) / max(abs(x), abs(y)) if math.isfinite(x) and math.isfinite(y) else 1.0
-
-
-NUMBERS = {
-    "armature": ("armature",), "damping": ("damping", "damping v|v|", "damping v^3"),
-    "springs": ("stiffness", "stiffness x^2", "stiffness x^3", "rest"), "limits": ("lower", "upper"),
-    "friction": ("friction",), "effort": ("least force", "most force"),
-}  # fmt: skip
-"""Quantity -> numbers of joints that make it up."""
-USUAL = {"lower": -math.inf, "upper": math.inf, "least force": -math.inf, "most force": math.inf}
-"""What such a number is where nothing is said; of others 0."""
 
 
 def numbers(quantity: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | None:
@@ -200,10 +203,6 @@ def _of_forces(found: Floats, wanted: Floats, what: str, names: Sequence[str], p
     return [Gap(float(off[k, i]) / (size or 1.0), f"{what} {names[i]}", *values, part=part, lacks=False)]
 
 
-SINGLE = 1e-6
-"""Part of the reach within which corners of meshes are the same: both have them in single precision."""
-
-
 def matched(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[int, tuple[int, float]]:
     """Return shape of the file -> the nearest of the importer's that is left, and how far it is: names may differ."""
     mine, theirs = (np.array([shape[3] for shape in one["shapes"]]) for one in (found, wanted))
@@ -252,10 +251,6 @@ def contacts(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[in
     told = [*((pair, "may not touch") for pair in theirs - mine), *((pair, "may touch") for pair in mine - theirs)]
     named = sorted((" and ".join(sorted(name[k] for k in pair)), how) for pair, how in told)
     return [Gap(1.0, f"{both} {how}", len(mine), len(theirs)) for both, how in named]
-
-
-PARTS = ("slide", "slide", "spin", "roll", "roll", "margin")
-"""Of a pair that may touch: friction along two tangents, about the normal and about them, margin."""
 
 
 def surfaces(found: Mapping[str, Any], wanted: Mapping[str, Any], of: Mapping[int, tuple[int, float]]) -> Any:

@@ -21,6 +21,16 @@ from crossbody.cases.files.inertias import six
 from crossbody.cases.files.reading import read
 from crossbody.cases.rotations import matrices
 
+Node = ElementTree.Element
+PLACED = ("body", "geom", "site", "camera", "inertial", "frame", "light")
+TURNS = ("quat", "euler", "axisangle", "xyaxes", "zaxis")
+WRITTEN = ("joint", "geom", "site")  # what takes its class's attributes as its own
+APPLIED = ("eulerseq", "boundmass", "boundinertia", "balanceinertia", "settotalmass", "inertiagrouprange")
+"""Of the compiler: what is done with, once inertias and orientations are written."""
+FOLDERS = {"meshdir": ("mesh", "hfield", "skin"), "texturedir": ("texture",)}
+"""Of the compiler: folders, and what stands in them."""
+REFUSED = ("replicate", "composite", "flexcomp", "attach", "plugin")
+
 
 def numbers_of(text: str) -> Floats:
     """Return the numbers of an attribute."""
@@ -47,17 +57,6 @@ def quaternion(R: Floats) -> Floats:
 def beside(out: Path, path: Path, name: str) -> str:
     """Return how a file calls what another calls so from where that stands."""
     return os.path.relpath(path.resolve().parent / name, out.resolve().parent)
-
-
-Node = ElementTree.Element
-PLACED = ("body", "geom", "site", "camera", "inertial", "frame", "light")
-TURNS = ("quat", "euler", "axisangle", "xyaxes", "zaxis")
-WRITTEN = ("joint", "geom", "site")  # what takes its class's attributes as its own
-APPLIED = ("eulerseq", "boundmass", "boundinertia", "balanceinertia", "settotalmass", "inertiagrouprange")
-"""Of the compiler: what is done with, once inertias and orientations are written."""
-FOLDERS = {"meshdir": ("mesh", "hfield", "skin"), "texturedir": ("texture",)}
-"""Of the compiler: folders, and what stands in them."""
-REFUSED = ("replicate", "composite", "flexcomp", "attach", "plugin")
 
 
 def _about(axis: Floats, angle: float) -> Floats:

@@ -23,6 +23,15 @@ OVER_DEPTH = (
     "Force over penetration depth of the contact with the largest load. A spring gives a "
     "line; damping opens it to a loop whose area is the energy lost. A force below zero pulls."
 )
+LINE = {"color": LEVEL, "dash": "dash", "width": 1}
+DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
+MOST = 1000  # points of one engine's line
+TEXT = (
+    "For the contact with the largest load. The force of a sticking contact is inside the "
+    "cone, that of a sliding one on its edge; outside, it violates Coulomb's law. In the "
+    "plane of the contact, the friction force relative to mu lam is a point of the unit disc; "
+    "a sliding contact has it opposite to the slip."
+)
 
 
 def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
@@ -70,17 +79,6 @@ def _over_depth(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
         "y": coded(y[at].astype(np.float32)), "name": plain(label(trace)), "meta": label(trace),
         "line": {key: look[key] for key in ("color", "dash", "width")},
     }  # fmt: skip
-
-
-LINE = {"color": LEVEL, "dash": "dash", "width": 1}
-DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
-MOST = 1000  # points of one engine's line
-TEXT = (
-    "For the contact with the largest load. The force of a sticking contact is inside the "
-    "cone, that of a sliding one on its edge; outside, it violates Coulomb's law. In the "
-    "plane of the contact, the friction force relative to mu lam is a point of the unit disc; "
-    "a sliding contact has it opposite to the slip."
-)
 
 
 def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:

@@ -35,6 +35,19 @@ from crossbody.reports.figures.section import Column, Figure, Kind, Section, Tab
 
 LEVEL = 6
 """Of compression: more takes three times as long for a hundredth of the size."""
+PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
+PARTS = ("page.js", "plots.js", "solids.js", "player.js")  # the pages' own script, in this order
+SIGNS = {
+    "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·",
+    "ledger only": "∑", "skipped": "-", "crashed": "!",
+}  # fmt: skip
+"""A verdict is told by sign and word besides its colour."""
+MOST = 2000  # rows of a table that a page shows; the file beside it has all
+THEME = (
+    'try { const kept = localStorage.getItem("crossbody-theme"); '
+    "if (kept) document.documentElement.dataset.theme = kept; } catch { /* a browser may refuse storage to a file */ }"
+)
+"""Runs before anything is drawn, so that a page does not flash."""
 
 
 def packed_text(text: str) -> str:
@@ -96,14 +109,6 @@ def _name(bucket: Bucket) -> str:
 
 
 TEMPLATES = Path(__file__).parent / "templates"
-PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
-PARTS = ("page.js", "plots.js", "solids.js", "player.js")  # the pages' own script, in this order
-SIGNS = {
-    "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·",
-    "ledger only": "∑", "skipped": "-", "crashed": "!",
-}  # fmt: skip
-"""A verdict is told by sign and word besides its colour."""
-MOST = 2000  # rows of a table that a page shows; the file beside it has all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,13 +175,6 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
         inline={key: Markup(text) for key, text in inline.items()}, theme=Markup(THEME),
         policy=policy(scripts, single),
     )  # fmt: skip
-
-
-THEME = (
-    'try { const kept = localStorage.getItem("crossbody-theme"); '
-    "if (kept) document.documentElement.dataset.theme = kept; } catch { /* a browser may refuse storage to a file */ }"
-)
-"""Runs before anything is drawn, so that a page does not flash."""
 
 
 def policy(scripts: Sequence[str], single: bool) -> str:

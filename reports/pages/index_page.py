@@ -36,6 +36,8 @@ VALUES = columns(
     value=("Now", Kind.NUMBER), limit=("Limit", Kind.NUMBER), unit="Unit",
     moved=("Moved by, of the limit", Kind.NUMBER),
 )  # fmt: skip
+SHOWN = 100  # cases on one page of the index
+SKETCHED = 80  # points of a sketch of a motion
 
 
 def changes(now: Sequence[Row], before: Sequence[Row], name: str) -> Section:
@@ -77,10 +79,6 @@ def _share(row: Row) -> float:
         return 0.0
     apart = abs(value - before)
     return apart / limit if limit else math.inf if apart else 0.0
-
-
-SHOWN = 100  # cases on one page of the index
-SKETCHED = 80  # points of a sketch of a motion
 
 
 def index_pages(found: Results) -> list[Page]:

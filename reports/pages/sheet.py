@@ -21,6 +21,13 @@ EVENTS, SHARE = 40, 0.4
 TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46
 """Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one
 group, between groups (with times), pixels."""
+MODE_COLOURS = {
+    Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
+    Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
+    Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
+}  # fmt: skip
+LONGEST = 150  # intervals of one mode in one bar; of more, the longest are drawn
+MOST_CONTACTS = 8
 
 
 class Sheet:
@@ -140,15 +147,6 @@ def _times(t: Floats) -> Floats:
     apart = np.diff(t)
     smallest = np.min(apart[apart > 0.0], initial=np.inf)
     return t.astype(np.float32) if smallest > FINE * abs(t[-1]) else t
-
-
-MODE_COLOURS = {
-    Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
-    Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
-    Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
-}  # fmt: skip
-LONGEST = 150  # intervals of one mode in one bar; of more, the longest are drawn
-MOST_CONTACTS = 8
 
 
 def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None) -> Figure:

@@ -25,6 +25,8 @@ WORSE = Limit(
 )  # fmt: skip
 WHOLE = 100.0  # what a share in percent would be at best
 FAILED = "A run that ends early predicts nothing after its end."
+MEASURED, SYNTHETIC = "measurement", "SYNTHETIC, no measurement"
+RESIDUALS = ("who", "channel", "unit", "window", "t", "measured", "value")
 
 
 def parse(pairs: Sequence[str]) -> tuple[Limit, ...]:
@@ -89,9 +91,6 @@ def against(value: float, limit: Limit | None) -> tuple[Word, str, float, float]
     off = Limit(metric=limit.metric, value=allowed, why=limit.why, known=limit.known, known_size=limit.known_size)
     word, why = judge(value - best, off, None)
     return word, why, best, allowed
-
-
-MEASURED, SYNTHETIC = "measurement", "SYNTHETIC, no measurement"
 
 
 def tier(log: Log) -> str:
@@ -180,9 +179,6 @@ def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[st
                     "who": who, "channel": c.name, "input": name, "lag": lag, "value": value,
                     "band": test.band,
                 }  # fmt: skip
-
-
-RESIDUALS = ("who", "channel", "unit", "window", "t", "measured", "value")
 
 
 def residuals(found: Comparison, points: int = 2000) -> pd.DataFrame:

@@ -19,6 +19,14 @@ from crossbody.engines.nearest import Places, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
 
 Pose = tuple[Floats, Floats]  # origins (n, 3), m, and rotations (n, 3, 3) of one body
+MOST = 500  # bodies that are drawn
+SHORT = 1e-5
+"""Over so long a time velocities are taken from places, s: its square and rounding over it are both small."""
+AROUND = 24  # points of a drawn circle
+FLAT = 5  # decimals to which planes are the same side of a hull
+SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+"""Corners of each side of a box, seen from outside against the clock."""
 
 
 def body_poses(scene: Scene, q: Floats) -> Mapping[str, Pose]:
@@ -56,16 +64,6 @@ def _moved(pose: Pose, joint: Joint, q: Floats) -> Pose:
     turn = matrices(q if joint.type == "ball" else np.concatenate([np.cos(half), np.sin(half) * axis], axis=1))
     turned = rotation @ turn
     return origin + rotation @ anchor - turned @ anchor, turned
-
-
-MOST = 500  # bodies that are drawn
-SHORT = 1e-5
-"""Over so long a time velocities are taken from places, s: its square and rounding over it are both small."""
-AROUND = 24  # points of a drawn circle
-FLAT = 5  # decimals to which planes are the same side of a hull
-SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-"""Corners of each side of a box, seen from outside against the clock."""
 
 
 def stage(p: Parameters) -> Stage:

@@ -25,6 +25,12 @@ from crossbody.reports.sweep.spec import Spec
 RTOL = 1e-9
 CONSTANTS = ("a0", "a1", "a2", "b0", "b1")
 Ready = tuple[Spec, Case, System]
+Rows = list[dict[str, Any]]
+Chunk = tuple[int, Sequence[Spec]]
+Task = TypeVar("Task")
+Done = TypeVar("Done")
+ANSWER = 4.0  # time that a scheduler has to answer, s
+ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
 
 
 def together(specs: Iterable[Spec]) -> list[dict[str, Any]]:
@@ -102,14 +108,6 @@ def _ended(t: float, q: Any, v: Any, nc: int, outcome: Outcome, steps: int, wall
         t=np.array([t]), q=q[None], v=v[None], gap=nothing, lam=nothing, energy=np.zeros((1, 2)),
         mode=np.full((1, nc), -1, np.int8), outcome=outcome, steps=steps, wall_s=wall_s,
     )  # fmt: skip
-
-
-Rows = list[dict[str, Any]]
-Chunk = tuple[int, Sequence[Spec]]
-Task = TypeVar("Task")
-Done = TypeVar("Done")
-ANSWER = 4.0  # time that a scheduler has to answer, s
-ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
 
 
 def work(chunk: Chunk, alone: bool = False) -> tuple[int, Rows]:

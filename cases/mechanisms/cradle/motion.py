@@ -25,6 +25,9 @@ Impact = Callable[[Floats, Floats, Touching, float, float], Iterator[Impulses]]
 
 TIE = 1e-12  # rates are equal within this part of the fastest ball
 STILL = 1e-9  # a gap whose rate is below this part of the fastest one seen so far stands still
+MAX_IMPACTS = 100_000
+TOUCH = 64.0 * float(np.finfo(np.float64).eps)
+"""A gap this small, of the largest coordinate and at least of 1 m, is closed."""
 
 
 def sequential(masses: Floats, v: Floats, touching: Touching, e: float, slow: float) -> Iterator[Impulses]:
@@ -92,11 +95,6 @@ def pushes(G: Floats, b: Floats) -> Floats:
 
 
 RULES: dict[str, Impact] = {"sequential": sequential, "simultaneous": simultaneous}
-
-
-MAX_IMPACTS = 100_000
-TOUCH = 64.0 * float(np.finfo(np.float64).eps)
-"""A gap this small, of the largest coordinate and at least of 1 m, is closed."""
 
 
 @dataclass(slots=True)

@@ -23,6 +23,9 @@ SHUT = 1e-11
 MAX_STEPS = 200_000
 
 Force = Callable[[Floats, Floats], Floats]
+LARGEST = 20  # balls up to which chains are integrated directly
+_INTEGRATED = ("linear", "hertz", "memoryless")
+_ELASTIC = ("linear", "hertz")
 
 
 def linear(row: Row) -> Floats:
@@ -106,9 +109,6 @@ def _rests(y: Floats, gap: float) -> bool:
     return bool(np.all((h > SHUT) | ((h >= -SHUT) & (np.abs(rate) <= SHUT))))
 
 
-LARGEST = 20  # balls up to which chains are integrated directly
-
-
 def sequential(row: Row) -> Floats:
     """Speeds behind one collision after another (n,), m/s; exact."""
     return Motion(row, "sequential").final
@@ -136,8 +136,6 @@ RULES: dict[str, Callable[[Row], Floats]] = {
     "hertz": hertz,
     "memoryless": memoryless,
 }
-_INTEGRATED = ("linear", "hertz", "memoryless")
-_ELASTIC = ("linear", "hertz")
 
 
 def answer(name: str, row: Row) -> Floats | None:

@@ -26,6 +26,12 @@ from crossbody.cases.mechanisms.soft.form import smooth
 COS = (1.0, -0.5, -0.5)
 SIN = (0.0, -(0.75**0.5), 0.75**0.5)
 """Of what turns each arm's frame into the base's about z, the sine times the robot's sign."""
+NEWTON, CLOSED = 20, 1e-12
+"""Steps at most, and the gap of the loops, m, at which the unmeasured angles count as found."""
+SINGULAR = 1e10  # condition of h_x beyond which there is no control Jacobian
+MOTORS = np.arange(0, 9, 3)
+OTHERS = np.delete(np.arange(9), MOTORS)
+NONE = np.full(3, np.nan)
 
 
 def numbers(p: Mapping[str, float]) -> Floats:
@@ -78,14 +84,6 @@ def motor_torque(y: Floats, x: Floats, asked: Floats, p: Floats, u: Floats) -> N
         return
     St = np.ascontiguousarray(S.T)
     u[:] = St @ (M @ (S @ np.linalg.solve(Jy, asked))) + St @ pull
-
-
-NEWTON, CLOSED = 20, 1e-12
-"""Steps at most, and the gap of the loops, m, at which the unmeasured angles count as found."""
-SINGULAR = 1e10  # condition of h_x beyond which there is no control Jacobian
-MOTORS = np.arange(0, 9, 3)
-OTHERS = np.delete(np.arange(9), MOTORS)
-NONE = np.full(3, np.nan)
 
 
 @dataclass(frozen=True, slots=True)

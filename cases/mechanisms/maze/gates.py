@@ -47,6 +47,12 @@ OFF, BALANCE, SNATCH, CENTRE = range(4)
 """Modes of the controller: no torque; on top of a ring; at a gap until the next face; in the centre."""
 BELOW, ABOVE, NORMALS = 0, 3, 6
 """Rows of faces, each with both tips of a gap behind it; then those of the slip on both faces."""
+Modes = NDArray[np.int8]
+EDGE_BELOW, EDGE_ABOVE, INWARD, OUTWARD, STRAYED = range(5)
+GUARDS = 5
+DEAD_BAND = 1e-12  # by how much a position must pass an edge before it can come back over it, relative
+GIVEN_UP = math.radians(60.0)  # angle from the top beyond which the controller has no way back, rad
+FREE, CONTACT = 0, 1
 
 
 def numbers(p: Mapping[str, Value], maze: Maze) -> Floats:
@@ -125,14 +131,6 @@ def _tip(
     across = ny * (v[1] + py * v[0]) - nx * (v[2] - px * v[0])
     h[row], H[row, 0], H[row, 1], H[row, 2] = d - cap - p[RADIUS], nx * py - ny * px, nx, ny
     Hdv[row] = across * across / d + v[0] * v[0] * (nx * px + ny * py)
-
-
-Modes = NDArray[np.int8]
-EDGE_BELOW, EDGE_ABOVE, INWARD, OUTWARD, STRAYED = range(5)
-GUARDS = 5
-DEAD_BAND = 1e-12  # by how much a position must pass an edge before it can come back over it, relative
-GIVEN_UP = math.radians(60.0)  # angle from the top beyond which the controller has no way back, rad
-FREE, CONTACT = 0, 1
 
 
 def guards(q: Floats, p: Floats, g: Floats) -> None:

@@ -57,6 +57,14 @@ COORDINATES = (
     *((f"integral of the error {axis}", "m s") for axis in "xyz"),
 )  # fmt: skip
 CONTACTS = (*robot.LOOPS, "left", "right", "table")
+HINGES, LEFT, RIGHT, FELT, BLOCK, ERROR = 9, 9, 10, 11, 12, 15
+STATES = ("difference", "error x", "error y", "error z")
+SIGN, FINGERS = len(delta.ROBOT) + 6, len(delta.ROBOT) + 7
+"""Where the robot's sign and the numbers of the fingers stand, behind those of friction and servos."""
+PATH = FINGERS + len(NAMES)
+STROKE, DESCENT, RISE, RISE_TIME, TORQUE = range(PATH, PATH + 5)
+ROWS = (0, 1, 2, 3, 4, 5, 7, 8, 6)
+"""Of the loops, the pads and the table: the scene has bounds of joints before those of tendons."""
 
 
 def check(p: Mapping[str, float]) -> None:
@@ -75,16 +83,6 @@ def start(p: Mapping[str, float]) -> Floats:
     half = 0.5 * p["width"]
     reach = p["jaw"] + half
     return np.concatenate([arms, [-reach, reach, 0.0], [p["offset"], 0.0, p["table"] - half], np.zeros(3)])
-
-
-HINGES, LEFT, RIGHT, FELT, BLOCK, ERROR = 9, 9, 10, 11, 12, 15
-STATES = ("difference", "error x", "error y", "error z")
-SIGN, FINGERS = len(delta.ROBOT) + 6, len(delta.ROBOT) + 7
-"""Where the robot's sign and the numbers of the fingers stand, behind those of friction and servos."""
-PATH = FINGERS + len(NAMES)
-STROKE, DESCENT, RISE, RISE_TIME, TORQUE = range(PATH, PATH + 5)
-ROWS = (0, 1, 2, 3, 4, 5, 7, 8, 6)
-"""Of the loops, the pads and the table: the scene has bounds of joints before those of tendons."""
 
 
 def _tip(i: int, r: Floats, rd: Floats, p: Floats, at: Floats, rate: Floats, others: Floats) -> None:
