@@ -41,7 +41,7 @@ def agreement(
     free = np.setdiff1d(np.arange(len(x)), list(fixed))
     if not len(free):
         return ()
-    sides = [_half(J[rows][:, free], residual[rows], part, scale[free]) for rows, part in _halves(layout)]
+    sides = [_estimated(J[rows][:, free], residual[rows], part, scale[free]) for rows, part in _halves(layout)]
     if len(sides) < 2:
         return ()
     (a, s, f, first), (b, t, g, second) = sides
@@ -79,10 +79,10 @@ def _halves(layout: Layout) -> list[tuple[NDArray[np.int64], Layout]]:
     ]
 
 
-def _half(
+def _estimated(
     J: Floats, residual: Floats, layout: Layout, scale: Floats
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
-    """Step, standard deviations, degrees of freedom, and whether the half tells each unknown."""
+    """Step, standard deviations, degrees of freedom, and whether the data tell each unknown."""
     told = information(J, scale)
     step = told.weights.T @ residual
     spread = scatter(told.basis, told.weights, residual - told.basis @ (told.basis.T @ residual), layout)
@@ -124,14 +124,11 @@ def moves(problem: Exact, x: Floats, sizes: Floats, fixed: Sequence[int]) -> dic
         return {}
     parts = [_projected(joint, j, z, loose) for j in range(len(joint.cut))]
     J, r = (np.concatenate([part[i] for part in parts]) for i in range(2))
-    told = information(J, sizes[loose])
-    step = told.weights.T @ r
-    spread = scatter(told.basis, told.weights, r - told.basis @ (told.basis.T @ r), joint.layout)
-    seen = np.all(np.abs(told.null) < WEIGHT, axis=0) if len(told.null) else np.ones(len(loose), dtype=bool)
-    limit = np.atleast_1d(stats.t.isf(0.5 * UNLIKELY / len(loose), spread.freedom))
+    step, std, freedom, seen = _estimated(J, r, joint.layout, sizes[loose])
+    limit = np.atleast_1d(stats.t.isf(0.5 * UNLIKELY / len(loose), freedom))
     return {
         int(i): Move(by=float(b), std=float(s), refuted=bool(abs(b) > q * s))
-        for i, b, s, q, known in zip(loose, step, spread.std, limit, seen, strict=True)
+        for i, b, s, q, known in zip(loose, step, std, limit, seen, strict=True)
         if known
     }
 
