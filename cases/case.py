@@ -167,11 +167,7 @@ class Inputs:
     values: Floats
 
     def __post_init__(self) -> None:
-        """Check shapes, and that times increase.
-
-        Raises:
-            SceneError: naming the field and what would be valid.
-        """
+        """Check shapes, and that times increase."""
         times = frozen("Inputs", "times", self.times, (None,))
         values = frozen("Inputs", "values", self.values, (len(times), len(self.names)))
         if not (np.all(np.isfinite(times)) and np.all(np.diff(times) > 0) and np.all(times >= 0)):
@@ -457,11 +453,7 @@ class CaseMetric:
     always: bool = False
 
     def __post_init__(self) -> None:
-        """Check that there is one function.
-
-        Raises:
-            InvalidValue: if there is none, or more than one.
-        """
+        """Check that there is one function."""
         given = [name for name in ("number", "signal", "instants") if getattr(self, name) is not None]
         if len(given) != 1:
             raise InvalidValue(f"A metric of a case has one of number, signal and instants; given: {given or 'none'}.")

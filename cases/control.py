@@ -146,13 +146,7 @@ class Controller:
         self.values: list[Floats] = []
 
     def __call__(self, t: float, q: Floats, v: Floats) -> Floats:
-        """Ask for the inputs (nu,) from t on; a copy.
-
-        Raises:
-            ControlError: if it raises, or gives something else than as many real numbers as there
-                are controls.
-            NotFinite: if it gives NaN or infinity.
-        """
+        """Ask for the inputs (nu,) from t on; a copy."""
         began = perf_counter()
         try:
             try:

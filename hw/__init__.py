@@ -106,11 +106,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for; an absent package is an error that names the extra.
-
-    Raises:
-        FormatUnavailable: if msgspec or another package of the extra `logs` is not installed.
-    """
+    """Import what is asked for; an absent package is an error that names the extra."""
     if name == "models":
         return import_module("crossbody.hw.models")
     if name not in _LAZY:

@@ -165,11 +165,7 @@ class Sensors:
     drift: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check ranges.
-
-        Raises:
-            InvalidValue: naming the attribute.
-        """
+        """Check ranges."""
         for field in fields(self):
             value = getattr(self, field.name)
             low = -1e-2 if field.name == "drift" else 0.0

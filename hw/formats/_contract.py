@@ -51,11 +51,7 @@ class Group:
     start: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the number of rows, which memory is asked for.
-
-        Raises:
-            InvalidValue: if it is none.
-        """
+        """Check the number of rows, which memory is asked for."""
         if self.rows is not None:
             whole("Group.rows", self.rows, low=0)
 

@@ -212,11 +212,7 @@ def _joined(found: Scan, block: Rows, limit: int, *, unwrap: bool) -> tuple[Rows
 
 
 def _over_turns(plan: Plan, sources: Sequence[Source], rows: Rows, unwrap: bool) -> tuple[Rows, tuple[Repair, ...]]:
-    """Rows of other times with angles that go on over a turn: between the two sides of a wrap nothing lies.
-
-    Raises:
-        LogFormatError: if they wrap, are not to be unwrapped and would be joined by straight lines.
-    """
+    """Rows of other times with angles that go on over a turn: between the two sides of a wrap nothing lies."""
     if unwrap:
         return _repair.unwrap(rows, _angles(sources))
     if plan.columns.join == "linear":

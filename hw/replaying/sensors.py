@@ -29,11 +29,7 @@ class Sensor:
     quantum: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check signs.
-
-        Raises:
-            InvalidValue: naming the attribute.
-        """
+        """Check signs."""
         for name in ("rate", "quantum"):
             if not getattr(self, name) >= 0.0:
                 raise InvalidValue(f"Sensor: {name} is {getattr(self, name)!r}; it must be at least 0.")

@@ -86,12 +86,7 @@ class Family:
     share: int = 1
 
     def __post_init__(self) -> None:
-        """Check that every name has one source.
-
-        Raises:
-            InvalidValue: for a name that is drawn, fixed or in the grid twice; for neither axes
-                nor grid; for a share below 1.
-        """
+        """Check that every name has one source."""
         if self.share < 1:
             raise InvalidValue(f"{self.case}:{self.variant}: share is {self.share}; valid: 1 and more.")
         sources: list[Mapping[str, object]] = [self.axes, self.grid, self.fixed]
@@ -133,10 +128,6 @@ class Suite:
     about: str = ""
 
     def __post_init__(self) -> None:
-        """Check that something is run.
-
-        Raises:
-            InvalidValue: for no family, no engine, or no run.
-        """
+        """Check that something is run."""
         if not self.families or not self.engines or self.runs < 1:
             raise InvalidValue("A suite needs at least one family, one engine and one run.")
