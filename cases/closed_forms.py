@@ -16,18 +16,12 @@ from crossbody.cases.arrays import Floats
 
 @dataclass(frozen=True, slots=True)
 class LinearArc:
-    """One solution of x'' + a1 x' + a0 x = 0 from its value and rate at t = 0, accurate through the double pole.
+    """One solution of x'' + a1 x' + a0 x = 0 from its value x0 and rate x1 at t = 0.
 
     sigma = a1/2. Below critical damping x = exp(-sigma t) [x0 cos(wd t) + (x1 + sigma x0) sin(wd
     t)/wd]; from there on, with the rates r1 <= r2 and k = (r2 - r1)/2, x = exp(-r1 t) [(x1 + r2 x0)
     D + x0 E], E = exp(-2 k t), D = (1 - E)/(2 k): neither form subtracts what the double pole makes
     equal, and no exponential overflows.
-
-    Attributes:
-        a0: stiffness, 1/s^2.
-        a1: damping, 1/s.
-        x0: value at t = 0.
-        x1: rate at t = 0.
     """
 
     a0: float

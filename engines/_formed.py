@@ -45,12 +45,7 @@ def on_scene(case: Case) -> Case:
 
 @dataclass(kw_only=True)
 class FormedRun(Run):
-    """A prepared run of a form; see `crossbody.engines.Run`.
-
-    Attributes:
-        form: whose.
-        inner: the run of its scene.
-    """
+    """A prepared run of a form, by the run of its scene; see `crossbody.engines.Run`."""
 
     form: Form
     inner: Run

@@ -164,11 +164,7 @@ def ended(line: Line, q: Floats, v: Floats) -> Outcome:
 
 
 class Stepper(Protocol):
-    """An engine's world with the bodies in it.
-
-    Attributes:
-        scene: what it was built from.
-    """
+    """An engine's world with the bodies of a scene in it."""
 
     scene: Line
 
@@ -183,14 +179,7 @@ class Stepper(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Steps:
-    """A run of an engine with fixed steps.
-
-    Attributes:
-        stepper: the engine.
-        line: the scene.
-        t_end, dt: horizon and step, s.
-        max_steps: bound on their number.
-    """
+    """A run of an engine with fixed steps dt, s, up to a number of them."""
 
     stepper: Stepper
     line: Line

@@ -50,12 +50,7 @@ class Push(NamedTuple):
 
 
 class Rubbing:
-    """The contacts of a scene, some of which have friction.
-
-    Attributes:
-        touching: by the engine's poses.
-        nc: number of all rows.
-    """
+    """The contacts of a scene by the engine's poses, some of which have friction."""
 
     def __init__(self, scene: Scene) -> None:
         self.touching = Contacts(scene)

@@ -54,12 +54,7 @@ def why_not(scene: Scene, detector: str) -> str | None:
 
 
 class Rubs:
-    """A `Stepper`.
-
-    Args:
-        case: a scene with friction.
-        used: settings: dt, detector, restitution, sleep.
-    """
+    """A `Stepper` of a scene with friction; settings: dt, detector, restitution, sleep."""
 
     def __init__(self, case: Case, used: Mapping[str, Any]) -> None:
         assert case.scene is not None

@@ -46,13 +46,10 @@ SOFT_BOUND = 0.99
 
 
 class Rubs:
-    """A `Stepper`.
+    """A `Stepper` of a scene with friction; settings: dt, approximation, stiction, stiffness (0: Drake's own).
 
-    Args:
-        case: a scene with friction.
-        used: settings: dt, approximation, stiction, stiffness (0: Drake's own).
-        matched: whether places of boxes, capsules and hulls over planes are points; else solids
-            are Drake's own, of which it has one contact, where they are deepest.
+    Matched, places of boxes, capsules and hulls over planes are points; else solids are Drake's
+    own, of which it has one contact, where they are deepest.
     """
 
     def __init__(self, case: Case, used: Mapping[str, Any], matched: bool) -> None:

@@ -16,14 +16,10 @@ Keep = Callable[[float, Floats], object]  # time, s, and state behind a step -> 
 
 
 class Sim:
-    """A simulator of a system or diagram.
+    """A simulator of a system or diagram from its state x0, with a scheme and its accuracy.
 
-    Args:
-        root: what is simulated.
-        x0: its state at t = 0.
-        scheme: what integrates.
-        accuracy: what it is asked for; 0 for a system in discrete time.
-        first: step that is tried first, s; 0 for Drake's own.
+    The accuracy is 0 for a system in discrete time; the step that is tried first, s, for Drake's
+    own.
     """
 
     def __init__(self, root: Any, x0: Floats, scheme: str, accuracy: float, first: float = 0.0) -> None:

@@ -128,15 +128,7 @@ class Robot(Protocol):
 
 
 class Reading:
-    """An importer at work on a file.
-
-    Args:
-        name: of the importer.
-        path: of the file.
-        urdf: whether it is a URDF.
-        seconds: what it may take.
-        nice: how much it lets others go before it.
-    """
+    """An importer at work on a file, for some seconds; nice says how much it lets others go before it."""
 
     def __init__(self, name: str, path: Path, urdf: bool, seconds: float = SECONDS, nice: int = 0) -> None:
         module = REGISTRY.load(name)

@@ -20,9 +20,7 @@ FREE, CONTACT = int(Mode.FREE), int(Mode.CONTACT)
 class GatedRows(Rows):
     """Rows under discrete variables that are looked at once a step, as a user's own loop does.
 
-    Attributes:
-        gated: rows and variables of the run.
-        switches: what has changed of these, in order.
+    `switches` are the changes, in order.
     """
 
     def __init__(self, case: Case, scene: Scene, model: Any, data: Any) -> None:

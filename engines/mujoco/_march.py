@@ -114,11 +114,9 @@ class Locator:
 
 
 class Tape(Log):
-    """One row an instant; the last row is also the state to which a step returns that overran an event.
+    """One row an instant (capacity, size of the state), of which the first `n` are written.
 
-    Attributes:
-        rows (capacity, size of the state): the first `n` are written.
-        n: instants recorded.
+    The last is also the state to which a step returns that overran an event.
     """
 
     def __init__(self, model: Any, data: Any, capacity: int) -> None:

@@ -30,16 +30,7 @@ WORST = 1e-6
 
 
 class Touching:
-    """Impulses of rows that are closed, by ADMM.
-
-    Args:
-        rows: of the mechanism.
-        points: its rows as Pinocchio's constraints (`Scene.points`).
-        tol: absolute tolerance, m/s and N s.
-
-    Attributes:
-        iterations: counter.
-    """
+    """Impulses of rows that are closed, by ADMM to an absolute tolerance, m/s and N s."""
 
     def __init__(self, rows: PinRows, points: Points, tol: float) -> None:
         self.rows, self.points, self.iterations = rows, points, 0
@@ -81,20 +72,7 @@ class Touching:
 
 
 class TimeStepper:
-    """One run.
-
-    Args:
-        rows: the mechanism.
-        points: its rows as Pinocchio's constraints (`Scene.points`).
-        e: restitution of every row.
-        tol: absolute tolerance, m/s and N s.
-        log: is filled.
-        max_steps: bound on the steps.
-
-    Attributes:
-        steps, unsolved, iterations: counters.
-        outcome, message: how it ended.
-    """
+    """One run of steps with a restitution of every row, to an absolute tolerance, m/s and N s."""
 
     def __init__(self, rows: PinRows, points: Points, e: list[float], tol: float, log: Log, max_steps: int) -> None:
         self.rows, self.log, self.max_steps = rows, log, max_steps

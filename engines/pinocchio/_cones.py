@@ -30,13 +30,7 @@ Places = tuple[Touches, list[Floats], Floats]
 
 
 class Cones:
-    """A `Stepper`.
-
-    Args:
-        case: a scene with friction.
-        used: settings: dt, tol.
-        e: restitution of every row of the case.
-    """
+    """A `Stepper` of a scene with friction, with a restitution of every row; settings: dt, tol."""
 
     def __init__(self, case: Case, used: Mapping[str, Any], e: Sequence[float]) -> None:
         assert case.scene is not None

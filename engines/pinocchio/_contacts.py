@@ -25,10 +25,8 @@ BACK = 1e-6
 class ContactRows:
     """Rows of the contacts; no second derivative of a gap is written anywhere here.
 
-    Attributes:
-        count: number of rows.
-        along: of contacts whose shapes may lie along each other, whether these do; as they lie
-            where it says nothing.
+    `along` says of contacts whose shapes may lie along each other whether these do; as they lie
+    where it says nothing.
     """
 
     def __init__(self, scene: Scene, model: Any, placed: Mapping[str, tuple[int, Any]]) -> None:

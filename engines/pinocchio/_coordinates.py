@@ -30,12 +30,7 @@ PULL = 0.1  # 1/s, of a quaternion to length 1
 
 
 class Coordinates:
-    """The map of one scene.
-
-    Attributes:
-        nq, nv: numbers of positions and of velocities, in both.
-        same: whether these are the same in both.
-    """
+    """The map of one scene; `same` says whether the coordinates are the same in both."""
 
     def __init__(self, scene: Scene) -> None:
         self.nq, self.nv = scene.nq, scene.nv

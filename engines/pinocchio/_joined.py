@@ -34,10 +34,7 @@ AXES = pin.LOCAL_WORLD_ALIGNED
 class Joined:
     """Rows of the loops in space: three of points, and three of axes where it is a weld.
 
-    Args:
-        model: Pinocchio's; a copy gets a frame for every end.
-        placed: body -> joint that carries it, and its pose in that joint's frame.
-        loops: of type connect or weld.
+    A copy of Pinocchio's model gets a frame for every end.
     """
 
     def __init__(self, model: Any, placed: dict[str, tuple[int, Any]], loops: Sequence[Loop]) -> None:

@@ -192,10 +192,7 @@ def _sizes(rows: PinRows, q: Floats, v: Floats) -> tuple[Floats, Floats]:
 class Gaps:
     """Gaps of all rows of a scene by Pinocchio's kinematics: loops, bounds, then contacts of shapes.
 
-    Attributes:
-        own: number of rows before those of contacts.
-        touching: the contacts.
-        steady: whether H is the same everywhere.
+    `steady` says whether H is the same everywhere.
     """
 
     def __init__(self, scene: Scene, forces: parts.Forces, tree: tuple[Any, Placed], to: Coordinates) -> None:

@@ -32,12 +32,9 @@ def _chunks(length: int, first: bool, last: bool) -> Iterator[tuple[slice, int, 
 
 
 class JumpCheck:
-    """Wraps, slips and spikes of one coordinate, seen block by block.
+    """Wraps, slips and spikes of one coordinate, seen block by block; only angles wrap.
 
-    Args:
-        name: the coordinate's name.
-        unit: its SI unit; only angles wrap.
-        own: whether the values are the coordinate's own; else they are what its rate does not account for.
+    Values that are not the coordinate's own are what its rate does not account for.
     """
 
     def __init__(self, name: str, unit: str, own: bool = True) -> None:

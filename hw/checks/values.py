@@ -25,14 +25,7 @@ MOST = 8  # runs of a block that are looked at
 
 
 class ValueCheck:
-    """One channel, seen block by block.
-
-    Args:
-        channel: `role.name`, for findings.
-        unit: SI unit, for findings.
-        range: smallest and largest plausible value, SI.
-        measured: whether it is measured: a commanded value may rest as long as it likes.
-    """
+    """One channel, seen block by block; a commanded value may rest as long as it likes."""
 
     def __init__(
         self, channel: str, unit: str, range: tuple[float, float] | None = None, measured: bool = True

@@ -24,16 +24,9 @@ STEP = 0.1  # step of a derivative, as a part of the parameter
 
 
 class Differences:
-    """Residuals of many windows, measured less predicted, run by an engine; see `_derivative.Exact`.
+    """Residuals of many windows, measured less predicted, run by an engine; see `Exact`.
 
-    Args:
-        model: any.
-        numbers: every parameter of the model.
-        free: names of parameters.
-        cut: the windows.
-        starts: must be False.
-        stride: of so many samples one is compared.
-        engine: E or E:PROFILE; the model's first if empty.
+    `starts` must be False; an empty engine is the model's first.
     """
 
     most = 30

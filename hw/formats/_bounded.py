@@ -16,13 +16,7 @@ WIDTH = 8  # bytes that every number takes once it is a float64, whatever the fi
 
 
 class Bounded:
-    """A reader whose blocks are counted while they pass, and whose library may not take more than its budget.
-
-    Args:
-        path: the log.
-        reader: its reader; closed if it has too many columns.
-        budget: what reading may cost.
-    """
+    """A reader whose blocks are counted while they pass, and whose library may not take more than its budget."""
 
     def __init__(self, path: Path, reader: Reader, budget: Budget) -> None:
         self._reader = reader

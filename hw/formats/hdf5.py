@@ -39,10 +39,7 @@ def open_log(path: Path, options: Options) -> HdfReader:
 class HdfReader:
     """Numeric datasets, fields of compound ones too; links out of the file are not followed.
 
-    Args:
-        path: the file.
-        what: name of the format, for messages.
-        joint: between the names of a group and its member.
+    `joint` stands between the names of a group and its member.
     """
 
     def __init__(self, path: Path, what: str, joint: str) -> None:

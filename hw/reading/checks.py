@@ -22,9 +22,7 @@ FEWEST = 2  # rows
 class Checks:
     """Whether a log can be used, and what one should know about it.
 
-    Args:
-        sources: the signals, in the order of a block's values.
-        sample_time: nominal, s; None if the map does not say.
+    Sources are in the order of a block's values; the map need not say a nominal sample time, s.
     """
 
     def __init__(self, sources: Sequence[Source], sample_time: float | None) -> None:

@@ -21,13 +21,7 @@ FIRST = 65536  # rows, where nobody tells how many there will be
 
 
 class Stream:
-    """The blocks of one plan; `origin` is known once the first is there.
-
-    Args:
-        plan: what to read.
-        reader: the open log.
-        part: number of the run, where the map names a column that tells them apart.
-    """
+    """The blocks of one plan, or of one run in it; `origin` is known once the first is there."""
 
     def __init__(self, plan: Plan, reader: Reader, part: int | None = None) -> None:
         self.plan, self.origin = plan, 0

@@ -15,12 +15,7 @@ TOGETHER = 0.05  # largest distance of impacts that are the same one, s
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Impacts:
-    """Impacts of one motion.
-
-    Attributes:
-        t (m,): centroid of each acceleration, s.
-        jump (m,): change of the rate in it, m/s.
-    """
+    """Impacts of one motion: centroid of each acceleration, s, and change of the rate in it, m/s."""
 
     t: Floats
     jump: Floats

@@ -22,15 +22,7 @@ integrates, and what nothing depends on. Two of them together are scattered by t
 
 
 class Family:
-    """The equilibria of a case over one of its parameters.
-
-    Args:
-        name: of the case.
-        variant: its first if not given.
-        overrides: other parameters to change.
-        at: where to look, as of `places`.
-        parameter: that varies.
-    """
+    """The equilibria of a case over one of its parameters, from where `places` looks."""
 
     def __init__(
         self, name: str, variant: str | None, overrides: Mapping[str, Value], at: Mapping[str, float], parameter: str

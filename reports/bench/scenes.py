@@ -17,12 +17,7 @@ ENGINES = (*choice.DEFAULT_ENGINES, "exudyn", "drake", "dart", "pymunk")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """One case of the benchmark.
-
-    Attributes:
-        name, variant: of the case.
-        given: parameters that differ from the variant's own.
-    """
+    """One case of the benchmark, with parameters that differ from the variant's own."""
 
     name: str
     variant: str

@@ -30,13 +30,7 @@ AND, PAIRED = " together with ", 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Use:
-    """Where a file uses a feature.
-
-    Attributes:
-        feature: which.
-        places: file and line of each, in their order.
-        names: of the parts there and of the bodies around them.
-    """
+    """Where a file uses a feature: file and line of each place, and names of the parts and bodies there."""
 
     feature: Feature
     places: tuple[Place, ...]

@@ -103,12 +103,9 @@ def rows(
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What an importer says while it reads.
+    """What an importer says while it reads, each line once, beside the names of the file's parts.
 
-    Attributes:
-        lines: each once.
-        named: line of the file -> tag -> names of the parts that stand there.
-        parts: names of the file's parts.
+    `named` is line of the file -> tag -> names of the parts that stand there.
     """
 
     lines: Sequence[str]

@@ -37,12 +37,7 @@ class Stroke:
 
 
 class Film:
-    """A motion that can be drawn at any instant.
-
-    Args:
-        trace: the motion.
-        i: its place among those of its case, which decides its colour.
-    """
+    """A motion that can be drawn at any instant; its place among those of its case decides its colour."""
 
     def __init__(self, trace: Trace, i: int = 0) -> None:
         name = str(trace.about.get("mechanism", ""))

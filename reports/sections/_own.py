@@ -19,13 +19,7 @@ ANALYSIS = "analysis-"  # how the tables of an analysis begin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """As a module of a study: see the package.
-
-    Attributes:
-        TITLE: heading of its page and of the link to it.
-        sections: folder -> its sections.
-        CASES: names of those that it is about.
-    """
+    """As a module of a study, see the package: title, names of the cases it is about, folder -> sections."""
 
     TITLE: str
     sections: Callable[[Path], tuple[Section, ...]]

@@ -135,14 +135,7 @@ def arcs(ball: Ball, h: float, v: float, t_end: float) -> Iterator[Arc]:
 
 
 class Motion:
-    """The exact motion of one ball, to be evaluated at any times.
-
-    Args:
-        ball: the constants.
-        h: gap at t = 0, m.
-        v: its rate at t = 0, m/s.
-        t_end: horizon, s.
-    """
+    """The exact motion of one ball, from gap h, m, and rate v, m/s, at t = 0, to be evaluated at any times."""
 
     def __init__(self, ball: Ball, h: float, v: float, t_end: float) -> None:
         self.ball = ball

@@ -128,9 +128,8 @@ def _collisions(t: float, struck: dict[int, float]) -> list[Event]:
 class Motion:
     """The motion of a row of sliders under a frozen rule, to be evaluated at any times.
 
-    Args:
-        row: the balls; they start at x = 0 (displacements) with `row.v0`.
-        rule: "sequential" or "simultaneous".
+    The balls start at x = 0 (displacements) with `row.v0`; the rule is "sequential" or
+    "simultaneous".
     """
 
     def __init__(self, row: Row, rule: str) -> None:

@@ -106,11 +106,7 @@ class Pose:
 
 
 class Controller:
-    """A computer that samples encoders and commands torques, a whole number of samples late.
-
-    Args:
-        parameters: of a case, by name: robot, circle, gains and how it is sampled.
-    """
+    """A computer that samples encoders and commands torques, a whole number of samples late."""
 
     def __init__(self, parameters: Any) -> None:
         self.words = {name: value for name, value in parameters.items() if isinstance(value, str)}

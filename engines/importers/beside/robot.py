@@ -36,13 +36,7 @@ def matched(ours: Any, theirs: Any) -> dict[str, int]:
 
 
 class Measured:
-    """An engine's robot in the scene's coordinates.
-
-    Args:
-        robot: a `Robot`.
-        ours: name, body and kind of the scene's joints.
-        found: of `matched`, for all of them.
-    """
+    """An engine's robot in the coordinates of the scene's joints, each of which was `matched`."""
 
     def __init__(self, robot: Any, ours: Any, found: Any) -> None:
         self.robot, self.ours = robot, ours
