@@ -1,4 +1,7 @@
-"""Limits of every case, to be widened with a reason but not left out; and those of engines for bodies on a line."""
+"""Limits that hold for every case, and those of engines for bodies on a line.
+
+A case may widen one with its reason, none may leave one out.
+"""
 
 from __future__ import annotations
 

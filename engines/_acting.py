@@ -1,4 +1,4 @@
-"""What acts on a scene from outside in a run: compiled forces, recorded inputs, a controller of the user's."""
+"""What acts on a scene in a run: compiled forces, recorded inputs, a controller of the user's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What engines for bodies on a line share: a prepared run, trajectories of what they step, one loop of time steps."""
+"""What engines for bodies on a line share: prepared runs, their trajectories, one loop of time steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws that engines integrate in real time: such a case, the steps that resolve it, how deep and fast rows get."""
+"""Cases in real time: their laws, the steps that resolve them, how deep and fast rows get."""
 
 from __future__ import annotations
 

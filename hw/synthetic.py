@@ -1,4 +1,4 @@
-"""Synthetic logs of the delta rig: assumed sensors on a plant that MuJoCo computed under the rig's sampled control.
+"""Synthetic logs of the delta rig: assumed sensors on a plant that MuJoCo computed.
 
 They are no measurement.
 """

@@ -1,4 +1,4 @@
-"""Which reader a file needs, by its suffix or its root; and what its text says that the compiler would pass over.
+"""Which reader a file needs, and what its text says that the compiler would pass over.
 
 A file may come from anywhere: it includes nothing from outside its folder, and it has no more
 bodies than a scene.

@@ -1,4 +1,4 @@
-"""Stepping: fixed steps, or the same cut at the first event of the rows, into a log that MuJoCo writes itself."""
+"""Stepping: fixed steps, or the same cut at the first event, into a log that MuJoCo writes itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far estimates can be relied on: halves of the data, windows that start elsewhere, the cost on either side."""
+"""How far estimates can be relied on: halves of the data, other starts, the cost on either side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How an engine looks in plots, tables and pictures; how plotly is told texts, arrays and axes, and plots in a grid."""
+"""How an engine looks in plots and tables; how plotly is told texts, arrays, axes, plots in a grid."""
 
 from __future__ import annotations
 

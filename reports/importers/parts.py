@@ -1,4 +1,4 @@
-"""Gaps between what an importer has made of the parts of a robot and what its file says, and how they are measured."""
+"""Gaps between what an importer has made of the parts of a robot and what its file says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The force of one contact: over its depth, and of friction against the cone and which way it slips and is pushed."""
+"""The force of one contact: over its depth, and of friction against the cone and the slip."""
 
 from __future__ import annotations
 

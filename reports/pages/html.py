@@ -1,4 +1,4 @@
-"""From sections to HTML: templates with their filters, names safe in a path, numbers for a reader, packed data.
+"""From sections to HTML: templates and their filters, names safe in a path, numbers, packed data.
 
 A packed value is the length of a JSON text (4 bytes), that text, and the bytes of all arrays that
 were taken out of it. Of an array consecutive rows are subtracted as whole numbers (their bit

@@ -1,4 +1,4 @@
-"""Stacked plots over one time axis, and the mode strip, as plain dictionaries: plotly's objects would take long."""
+"""Stacked plots over one time axis, and the mode strip, as plain dictionaries: quick."""
 
 from __future__ import annotations
 

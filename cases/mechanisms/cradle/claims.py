@@ -1,4 +1,4 @@
-"""What comes out of a cradle beside what collision rules say, and how far each engine may be from it, and why."""
+"""What comes out of a cradle beside what rules say, and how far each engine may be off, and why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run of the delta robot tells of its flange, and how far each engine may be from the truth, and why."""
+"""What a run of the delta robot tells of its flange, and how far each engine may be off, and why."""
 
 from __future__ import annotations
 

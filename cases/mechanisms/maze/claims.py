@@ -1,4 +1,4 @@
-"""What must come out of the ball maze, from closed forms of a ball on a face; how far engines may be off, and why."""
+"""What must come out of the ball maze, by closed forms, and how far engines may be off, and why."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must come out of the soft contact, from closed forms of both pads in contact; how far engines may be off."""
+"""What must come out of the soft contact, by closed forms, and how far engines may be off."""
 
 from __future__ import annotations
 
