@@ -45,26 +45,11 @@ DERIVED = frozenset(
 )
 """What the compiler computes from the rest, or what has no meaning without something that is refused."""
 
-UNSEEN = (
-    "bvh_",
-    "oct_",
-    "cam_",
-    "light_",
-    "mat_",
-    "mesh_",
-    "tex_",
-    "skin_",
-    "text_",
-    "numeric_",
-    "tuple_",
-    "name_",
-    "names_",
-    "sensor_",
-    "site_",
-    "map",
-    "efm",
-    "flexedge_J",
-    "hfield_",
+UNSEEN = tuple(
+    """
+    bvh_ oct_ cam_ light_ mat_ mesh_ tex_ skin_ text_ numeric_ tuple_ name_ names_ sensor_ site_ map efm
+    flexedge_J hfield_
+    """.split()  # noqa: SIM905
 )
 """What is only drawn, named, measured or kept for speed, by the beginning of its name."""
 
@@ -78,6 +63,13 @@ EMPTY = {"body_mocapid": -1, "body_plugin": -1, "geom_plugin": -1, "actuator_plu
 """Arrays whose default is not 0."""
 NOT_FELT = frozenset({"geom_fluid", "jnt_plasticadr", "tendon_plasticadr", "key_mpos", "key_mquat", "key_plastic"})
 """Of no effect here: the medium is refused by itself, and the others need what is refused."""
+HARMLESS = tuple(
+    """
+    CONSTRAINT EQUALITY CONTACT LIMIT GRAVITY REFSAFE WARMSTART SENSOR ISLAND AUTORESET EULERDAMP
+    MIDPHASE NATIVECCD MULTICCD FILTERPARENT
+    """.split()  # noqa: SIM905
+)
+"""Flags that are taken into account, or that change no physics of a scene."""
 
 
 def check_understood(model: Any) -> None:
@@ -97,27 +89,10 @@ def check_understood(model: Any) -> None:
     _check_options(model.opt)
 
 
-HARMLESS = (
-    "CONSTRAINT",
-    "EQUALITY",
-    "CONTACT",
-    "LIMIT",
-    "GRAVITY",
-    "REFSAFE",
-    "WARMSTART",
-    "SENSOR",
-    "ISLAND",
-    "AUTORESET",
-    "EULERDAMP",
-)
-HARMLESS_TOO = ("MIDPHASE", "NATIVECCD", "MULTICCD", "FILTERPARENT")
-"""Flags that are taken into account, or that change no physics of a scene."""
-
-
 def _check_flags(option: Any) -> None:
     import mujoco
 
-    allowed = {f"mjDSBL_{name}" for name in (*HARMLESS, *HARMLESS_TOO)}
+    allowed = {f"mjDSBL_{name}" for name in HARMLESS}
     for flag in mujoco.mjtDisableBit.__members__.values():
         if flag.name.startswith("mjDSBL") and option.disableflags & int(flag) and flag.name not in allowed:
             raise SceneError(f"The model sets the flag {flag.name}, which is not understood; valid: without it.")

@@ -43,16 +43,7 @@ HEAD = 4096
 
 
 _REGISTRY = Registry("log format", __name__)
-
-
-def names() -> tuple[str, ...]:
-    """Names of all formats, readable here or not; imports none of them."""
-    return _REGISTRY.names()
-
-
-def summary(name: str) -> str:
-    """What a format is, in one line; imports nothing."""
-    return _REGISTRY.summary(name)
+names, summary = _REGISTRY.names, _REGISTRY.summary  # readable here or not: nothing is imported
 
 
 def load(name: str) -> ModuleType:

@@ -18,11 +18,7 @@ __all__ = ["chosen", "load", "names", "summary"]
 
 
 _REGISTRY = Registry("model", __name__, hidden=("contract",))
-
-
-def names() -> tuple[str, ...]:
-    """Names of all models; imports none of them."""
-    return _REGISTRY.names()
+names = _REGISTRY.names
 
 
 @checked_arguments

@@ -78,11 +78,7 @@ class Scene(Protocol):
 
 
 _REGISTRY = Registry("picture of a mechanism", __name__)
-
-
-def names() -> tuple[str, ...]:
-    """Mechanisms that can be drawn; imports none."""
-    return _REGISTRY.names()
+names = _REGISTRY.names  # of mechanisms that can be drawn
 
 
 def load(name: str) -> Scene:
