@@ -14,11 +14,10 @@ from crossbody.cases import EngineUnavailable, UnknownName
 from crossbody.cases.files.conformance import FEATURES
 from crossbody.engines import importers
 from crossbody.reports import voice
-from crossbody.reports.commands.shared import where
+from crossbody.reports.commands.shared import publish, where
 from crossbody.reports.importers.compare import FAILED, OK, UNSEEN, UNSUPPORTED, WRONG
 from crossbody.reports.importers.conformance import table
-from crossbody.reports.pages import site
-from crossbody.reports.runs import output, study
+from crossbody.reports.runs import output
 from crossbody.reports.runs.provenance import provenance
 
 STUDY = "conformance"
@@ -44,11 +43,8 @@ def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, co
                 rows.append(told | asdict(row) | {"rewrite": feature.rewrite, "text": feature.text})
     if not (rows := [row for row in rows if row["engine"] not in absent]):
         raise EngineUnavailable(f"None of these is installed: {', '.join(wanted)}.")
-    found, told_by = pd.DataFrame(rows), provenance(command)
-    with output.folder(out, STUDY) as made:
-        study.write(made, [], study.judge([], {}), told_by)
-        study.write_table(made / STUDY, found, told_by)
-        site.write(made)
+    found = pd.DataFrame(rows)
+    publish(out, STUDY, {STUDY: found}, provenance(command))
     if not voice.told_as_json({STUDY: found}):
         _show(found, absent, out)
     return 0
