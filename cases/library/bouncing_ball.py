@@ -12,7 +12,7 @@ import numpy as np
 from crossbody.cases import closed_forms as cf
 from crossbody.cases import defaults
 from crossbody.cases.case import Case, Claim, Coordinate, Limit, Parameter, Tier, Value
-from crossbody.cases.mechanisms.ball.truth import Ball, Motion
+from crossbody.cases.mechanisms.ball import Ball, Motion
 from crossbody.cases.scene import UNBOUNDED, Body, Joint, Loop, RowLaw, Scene, Shape
 from crossbody.cases.scene_contacts import law_of
 

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from crossbody.cases import Mode, load
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.closed_forms import LinearArc
-from crossbody.cases.mechanisms.ball import truth as _ball_truth
-from crossbody.cases.mechanisms.ball.truth import Ball, Motion
+from crossbody.cases.mechanisms import ball as _ball_truth
+from crossbody.cases.mechanisms.ball import Ball, Motion
 
 SCENES = {
     "underdamped": (Ball(mass=1.0, gravity=9.81, a0=1e4, a1=20.0), 1.0, 0.0),
