@@ -51,12 +51,8 @@ class Form:
 def formed(case: Case, scene: Scene, q0: Floats, v0: Floats, **changes: Any) -> Case:
     """Return the case that a form runs: a scene under its own names and laws, from a start of its own.
 
-    Args:
-        case: which is to be run.
-        scene: that stands for it.
-        q0: start (nq,), in the coordinates of the joints.
-        v0: velocities there (nv,).
-        changes: other fields; inputs and control are none if not given, law and contacts are the scene's own.
+    The start is in the coordinates of the joints. Of other fields inputs and control are none if
+    not given, law and contacts are the scene's own.
     """
     contacts = tuple(rows_of(scene)[0])
     own: dict[str, Any] = {"inputs": None, "control": None, "law": law_of(scene), "contacts": contacts, **changes}

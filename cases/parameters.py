@@ -23,9 +23,6 @@ class Numbers(Parameter):
         Args:
             where: what is checked, for messages.
             value: such a text, one number, or numbers in a sequence.
-
-        Raises:
-            InvalidValue: if a part is not a number inside the bounds.
         """
         if isinstance(value, (int, float)):
             value = str(value)
@@ -46,11 +43,7 @@ class NumberOrWord(Parameter):
     """A number inside the bounds, or one of the words of `choices`."""
 
     def checked(self, where: str, value: Value) -> Value:
-        """The number or the word.
-
-        Raises:
-            InvalidValue: if it is neither.
-        """
+        """The number or the word."""
         if isinstance(value, str) and value in self.choices:
             return value
         number = Parameter(default=0.0, unit=self.unit, low=self.low, high=self.high, open_low=self.open_low)
@@ -61,11 +54,7 @@ class NumberOrWord(Parameter):
 
 
 def spread(where: str, text: Value, count: int) -> Floats:
-    """The numbers of a `Numbers` parameter (count,); one number serves all.
-
-    Raises:
-        InvalidValue: if there are neither one nor `count` of them.
-    """
+    """The numbers of a `Numbers` parameter (count,); one number serves all."""
     found = np.array([float(part) for part in str(text).split(",")])
     if len(found) not in (1, count):
         raise InvalidValue(f"{where} lists {len(found)} numbers; valid: one for all, or {count} separated by commas.")

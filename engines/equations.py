@@ -56,9 +56,6 @@ def system_of(case: Case, traced: bool | None = None) -> System:
     Args:
         case: whose.
         traced: of a scene: whether code is compiled for it alone; None takes it where it was compiled before.
-
-    Raises:
-        CaseUnsupported: if the reference has no equations of it.
     """
     if (build := builder(case.mechanism)) is not None:
         return _built(build, case.parameters, case.law)

@@ -104,11 +104,7 @@ class FileCase:
 
 
 def open_file(name: str) -> FileCase:
-    """Return what a file offers.
-
-    Raises:
-        NoFile: if it is not there.
-    """
+    """Return what a file offers."""
     return FileCase(path=existing(Path(name)))
 
 
@@ -220,11 +216,7 @@ def case_of(
 
 
 def check_runnable(scene: Scene) -> None:
-    """Refuse what the engines here do not have.
-
-    Raises:
-        SceneError: naming the part.
-    """
+    """Refuse what the engines here do not have."""
     spans = {tendon.name for tendon in scene.tendons if tendon.bodies}
     for loop in scene.loops:
         for name in {loop.first, loop.second} & spans if loop.type == "tendon" else ():
@@ -301,9 +293,6 @@ def assembled(model: Any, q: Floats, v: Floats) -> tuple[Floats, Floats]:
 
     Returns:
         Positions (nq,) and velocities (nv,) that keep the loops closed.
-
-    Raises:
-        SceneError: if none is found.
     """
     import mujoco
 

@@ -75,11 +75,7 @@ def unavailable(who: str, error: ModuleNotFoundError, *, ours: bool = True) -> F
 
 
 def recognise(path: Path) -> str:
-    """Name of the format that a file or folder is written in.
-
-    Raises:
-        LogFormatError: if it is absent, empty, no file, or of no known format.
-    """
+    """Name of the format that a file or folder is written in."""
     head = _head(path)
     found = [name for name in names() if load(name).recognises(path, head)]
     if len(found) == 1:
@@ -118,11 +114,7 @@ def _unreadable(path: Path, error: Exception) -> Exception:
 
 
 def options(name: str, given: Mapping[str, Any]) -> Any:
-    """The options of a format, as its own type.
-
-    Raises:
-        ColumnMapError: for one that it does not have, or of a wrong type.
-    """
+    """The options of a format, as its own type."""
     import msgspec
 
     try:

@@ -38,12 +38,7 @@ def load(name: str) -> Model:
 
 
 def chosen(model: str | Model) -> Model:
-    """A model by its name, or itself.
-
-    Raises:
-        UnknownName: if there is no model of that name.
-        InvalidValue: for what is neither.
-    """
+    """A model by its name, or itself."""
     from crossbody.hw.models.contract import Model
 
     return load(model) if isinstance(model, str) else arguments.instance("model", model, Model, "a model or its name")

@@ -125,12 +125,7 @@ class Model:
     limits: tuple[Limit, ...] = ()
 
     def numbers(self, given: Numbers | None = None) -> dict[str, Value]:
-        """Every parameter: the given ones, checked, and the defaults.
-
-        Raises:
-            UnknownName: for a parameter that the model does not have.
-            InvalidValue: for one outside its bounds.
-        """
+        """Every parameter: the given ones, checked, and the defaults."""
         if given is not None:
             arguments.instance(f"{self.name}: parameters", given, Mapping, "a table of names and values")
         found = {name: p.default for name, p in self.parameters.items()}
@@ -146,11 +141,7 @@ class Model:
         return self.needs or tuple(c.name for c in self.measured)
 
     def check_log(self, log: Log) -> None:
-        """Whether a log is one of this mechanism.
-
-        Raises:
-            SceneError: if it lacks a measured coordinate or some of the inputs, or has one in another unit.
-        """
+        """Whether a log is one of this mechanism."""
         from crossbody.hw.reading.log import Log
 
         have = arguments.instance("log", log, Log, "a log that was read").names("coordinates")

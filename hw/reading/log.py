@@ -129,11 +129,7 @@ class Log:
 
     @checked_arguments
     def channel(self, role: Role | str, name: str) -> Channel:
-        """One channel.
-
-        Raises:
-            UnknownName: if the log does not have it; the message lists what it has.
-        """
+        """One channel."""
         try:
             return self.channels[self._index[Role(role), name]]
         except (KeyError, ValueError):

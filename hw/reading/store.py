@@ -115,11 +115,7 @@ def _replacing(path: Path) -> Iterator[Path]:
 
 
 def about(path: Path) -> _About:
-    """What a stored log says of itself.
-
-    Raises:
-        LogFormatError: if it is not one that `store` wrote.
-    """
+    """What a stored log says of itself."""
     from crossbody.hw import formats
 
     if formats.recognise(path) == "parquet":
@@ -145,11 +141,7 @@ def _metadata(path: Path) -> _About | None:
 
 
 def columns_of(path: Path) -> Columns:
-    """The column map of a stored log: everything as it is.
-
-    Raises:
-        LogFormatError: if it is not one that `store` wrote.
-    """
+    """The column map of a stored log: everything as it is."""
     found = about(path)
     tables: dict[str, dict[str, Signal]] = {role.value: {} for role in Role}
     for channel in found.channels:
@@ -164,11 +156,7 @@ def columns_of(path: Path) -> Columns:
 
 
 def verified(log: Log, stored: _About) -> Log:
-    """A log read from the store, under its own provenance, if its numbers are those that were written.
-
-    Raises:
-        LogFormatError: if a number, a name or a unit has changed since.
-    """
+    """A log read from the store, under its own provenance, if its numbers are those that were written."""
     names, units = [TIME, *(c.column for c in log.channels)], ["s", *(c.unit for c in log.channels)]
     if _hash(names, units, [log.time, *(c.values for c in log.channels)]) != stored.content:
         raise LogFormatError(
@@ -180,11 +168,7 @@ def verified(log: Log, stored: _About) -> Log:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file, or of the names and contents of a folder's files in the order of their names.
-
-    Raises:
-        LogFormatError: if it cannot be read.
-    """
+    """SHA-256 of a file, or of the names and contents of a folder's files in the order of their names."""
     digest = hashlib.sha256()
     try:
         for file in sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]:

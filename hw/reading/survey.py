@@ -103,11 +103,7 @@ class Survey:
         return draft(self)
 
     def refuse(self) -> None:
-        """Raise the first fault that was found, if there is one.
-
-        Raises:
-            LogFormatError: with row, time and column of its first offence.
-        """
+        """Raise the first fault that was found, if there is one."""
         for finding in self.findings:
             if finding.fault:
                 raise finding.error(self.path)

@@ -122,11 +122,7 @@ def estimate_force(
 
 
 def pushed(model: str | Model) -> Model:
-    """The model.
-
-    Raises:
-        SceneError: if it has no input for a force that acts besides its torques.
-    """
+    """The model."""
     chosen = models.chosen(model)
     if not chosen.forces:
         raise SceneError(f"{chosen.name} has no input for a force that acts besides its torques.")
@@ -220,10 +216,6 @@ def conditions(t: Floats, B: Floats, rows: tuple[str, ...], names: tuple[str, ..
         rows: names of the coordinates.
         names: of the inputs.
         model: whose they are.
-
-    Raises:
-        SceneError: naming inputs that cannot be told apart, coordinates that none of them moves,
-            rank and condition.
     """
     k, m = B.shape[1:]
     if not m:

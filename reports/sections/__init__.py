@@ -29,12 +29,7 @@ _REGISTRY = Registry("study", __name__)
 
 
 def names(out: Path | None = None) -> tuple[str, ...]:
-    """Names of all studies.
-
-    Args:
-        out: leave out those of ours that have no table in this folder: its name begins with that
-            of its study.
-    """
+    """Names of all studies; of a folder without those of ours that have no table in it."""
     known = {*STUDIES, *_REGISTRY.names()}
     absent = [name for name in (*STUDIES, *_REGISTRY.own()) if out is not None and not any(out.glob(f"{name}*.json"))]
     return tuple(sorted(known.difference(absent)))
