@@ -62,8 +62,7 @@ class Drift:
                 found.append(self._rates(parts, v) if len(parts) else [])
                 if len(rows):
                     mujoco.mj_comVel(self.model, self.data)
-                    poses = self.data.xmat.reshape(-1, 3, 3).copy(), self.data.xpos.copy()
-            states.append((*poses, self.data.cvel.copy(), self.data.subtree_com[self.model.body_rootid]))
+                    states.append(self._state())
             own = np.array(found).reshape(len(times), -1)
             return np.concatenate([own, self._closing(states, rows, along)], axis=1) if len(rows) else own
 
@@ -78,6 +77,12 @@ class Drift:
         moves = both[:, :, 3:] + cross(data.subtree_com.take(self.roots, 0), turns)
         twist, change = np.concatenate([moves, turns], axis=2)
         return flat.drift((data.xmat.take(k, 0).reshape(-1, 3, 3), data.xpos.take(k, 0)), twist, change, rows)
+
+    def _state(self) -> tuple[Floats, ...]:
+        """Return poses and twists of all bodies, and their points: the trees' centres of mass."""
+        data = self.data
+        centres = data.subtree_com[self.model.body_rootid]
+        return data.xmat.reshape(-1, 3, 3).copy(), data.xpos.copy(), data.cvel.copy(), centres
 
     def _closing(self, states: Sequence[tuple[Floats, ...]], rows: Sequence[int], along: dict[int, bool]) -> Floats:
         """Return the rates of gaps (m, n) at some instants."""
