@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     )
     from crossbody.hw.reading.log import Channel, Log, Provenance, Repair
     from crossbody.hw.reading.read import Scan, check, parts, read, scan
-    from crossbody.hw.reading.rows import Rows
     from crossbody.hw.reading.store import store
+    from crossbody.hw.reading.stream import Rows
     from crossbody.hw.reading.survey import GroupSurvey, Survey, draft_text, survey
     from crossbody.hw.replaying.comparison import Comparison, Prediction
     from crossbody.hw.replaying.inverse import Inferred, estimate_force, inverse
@@ -49,7 +49,7 @@ _HOMES = {
     "reading.log": ("Channel", "Log", "Provenance", "Repair"),
     "reading.read": ("Scan", "check", "parts", "read", "scan"),
     "replaying.replay": ("replay",),
-    "reading.rows": ("Rows",),
+    "reading.stream": ("Rows",),
     "replaying.tracked": ("track_force",),
     "replaying.sensors": ("Sensor", "unlagged"),
     "reading.store": ("store",),

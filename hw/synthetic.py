@@ -23,7 +23,7 @@ from crossbody.hw.reading.checks import Checks
 from crossbody.hw.reading.columns import Role, Signal
 from crossbody.hw.reading.log import Channel, Log, Provenance
 from crossbody.hw.reading.plan import Source
-from crossbody.hw.reading.rows import Rows
+from crossbody.hw.reading.stream import Rows
 from crossbody.hw.reading.units import to_si
 from crossbody.reference.delta import scene
 

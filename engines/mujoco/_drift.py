@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Joint, Scene, Tendon
 from crossbody.engines._contacts import TURN, Contacts, Flat, Indices, closing, drift, flat
 from crossbody.engines._scene import angle_of, places
-from crossbody.engines.mujoco._observe import numbers, pose_of
+from crossbody.engines.mujoco._scene import numbers, pose_of
 from crossbody.engines.nearest import Pose, cross
 
 

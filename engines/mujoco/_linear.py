@@ -31,9 +31,8 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files.warned import captured
 from crossbody.engines.linear import Spot, Tangent, in_contact
 from crossbody.engines.mujoco._model import build, default_step
-from crossbody.engines.mujoco._observe import constraint_jacobian, mass_matrix
 from crossbody.engines.mujoco._rows import LIMITS, TOUCH
-from crossbody.engines.mujoco._scene import Hook, hooked
+from crossbody.engines.mujoco._scene import Hook, constraint_jacobian, hooked, mass_matrix
 
 EPS = 1e-5  # step of the centred differences, in the units of the coordinates
 ONE_SIDED = 1e-6  # the step that MuJoCo's documentation suggests for one-sided differences

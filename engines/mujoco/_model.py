@@ -29,10 +29,9 @@ from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import compiled, spec_of, without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._gated import GatedRows
-from crossbody.engines.mujoco._observe import constraint_jacobian, mass_matrix, numbers
 from crossbody.engines.mujoco._obvious import Obvious, obvious
 from crossbody.engines.mujoco._rows import Rows
-from crossbody.engines.mujoco._scene import Hook, Prepared, hooked
+from crossbody.engines.mujoco._scene import Hook, Prepared, constraint_jacobian, hooked, mass_matrix, numbers
 from crossbody.engines.mujoco._switched import Switched
 
 CONE = {"pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL, "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC}

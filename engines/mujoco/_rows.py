@@ -17,8 +17,8 @@ from crossbody.engines._contacts import TOGETHER, Contacts, end_of
 from crossbody.engines._log import Modes, Observe
 from crossbody.engines._scene import Forces
 from crossbody.engines.mujoco._build import MAX_IMPEDANCE, corner_names
-from crossbody.engines.mujoco._observe import constraint_jacobian, numbers
 from crossbody.engines.mujoco._rubs import AT_BOUND, Rub, Rubs
+from crossbody.engines.mujoco._scene import constraint_jacobian, numbers
 from crossbody.engines.nearest import corners
 
 DRY = (int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF), int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON))

@@ -23,9 +23,8 @@ from crossbody.engines._log import Modes
 from crossbody.engines._machines import elastic_part
 from crossbody.engines.mujoco._build import solref_of
 from crossbody.engines.mujoco._drift import Drift
-from crossbody.engines.mujoco._observe import constraint_jacobian
 from crossbody.engines.mujoco._rows import LIMITS, Present, Rows
-from crossbody.engines.mujoco._scene import Hook
+from crossbody.engines.mujoco._scene import Hook, constraint_jacobian
 
 REACH = 1e-12
 """How far above its surface a row is closed, m or rad: one at rest, or one that starts at its

@@ -14,7 +14,7 @@ from crossbody.hw.checks.smooth import JumpCheck
 from crossbody.hw.checks.values import ValueCheck
 from crossbody.hw.reading.columns import Role
 from crossbody.hw.reading.plan import PURE, ROTATES, Source
-from crossbody.hw.reading.rows import Rows
+from crossbody.hw.reading.stream import Rows
 
 FEWEST = 2  # rows
 

@@ -20,8 +20,7 @@ from crossbody.hw.reading.checks import Checks
 from crossbody.hw.reading.columns import Columns, Role, dump_columns, load_columns
 from crossbody.hw.reading.log import Channel, Log, Provenance, Repair
 from crossbody.hw.reading.plan import ROTATES, Plan, Source, make_plan
-from crossbody.hw.reading.rows import Rows, join
-from crossbody.hw.reading.stream import Stream, collect
+from crossbody.hw.reading.stream import Rows, Stream, collect, join
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

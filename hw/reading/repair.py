@@ -12,7 +12,7 @@ from crossbody.hw.checks.clock import GAP
 from crossbody.hw.checks.smooth import unwrapped
 from crossbody.hw.reading.columns import Role
 from crossbody.hw.reading.log import Repair
-from crossbody.hw.reading.rows import Rows
+from crossbody.hw.reading.stream import Rows
 
 REPAIRS = ("drop_duplicates", "fill_dropped", "unwrap")
 MOST = 10  # samples that are filled for each that is there

@@ -14,8 +14,7 @@ from crossbody.cases import Coordinate, Limit, Outcome, Trajectory, Value
 from crossbody.cases.arrays import Floats
 from crossbody.hw.reading.log import Log
 from crossbody.hw.replaying import measures as _measures
-from crossbody.hw.windows.impacts import impacts, least_of, matched
-from crossbody.hw.windows.rates import rates_by_fit
+from crossbody.hw.windows.rates import impacts, least_of, matched, rates_by_fit
 from crossbody.hw.windows.turns import deviation, difference, increments, way
 from crossbody.hw.windows.whiteness import Correlation, autocorrelation, crosscorrelation, noise_level, stride_of
 from crossbody.hw.windows.window import Window

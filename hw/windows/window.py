@@ -15,8 +15,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.engines.equations import system_of
 from crossbody.hw.models.contract import Model, Segment
 from crossbody.hw.reading.log import Log
-from crossbody.hw.windows.impacts import impacts, least_of
-from crossbody.hw.windows.rates import rates_by_fit
+from crossbody.hw.windows.rates import impacts, least_of, rates_by_fit
 from crossbody.hw.windows.turns import advanced
 from crossbody.reference import simulate
 

@@ -14,7 +14,7 @@ from log_files import STEADY
 
 from crossbody import hw
 from crossbody.cases import ColumnMapError, InvalidValue, LogFormatError
-from crossbody.hw.reading.rows import Rows, join
+from crossbody.hw.reading.stream import Rows, join
 from crossbody.hw.reading.units import to_si
 
 GOOD = """[time]

@@ -12,8 +12,7 @@ from crossbody.hw import Sensor, unlagged
 from crossbody.hw.replaying import measures as _measures
 from crossbody.hw.replaying import tracked
 from crossbody.hw.replaying.sensors import lagged
-from crossbody.hw.windows.impacts import Impacts, impacts, least_of, matched
-from crossbody.hw.windows.rates import derivatives, felt
+from crossbody.hw.windows.rates import Impacts, derivatives, felt, impacts, least_of, matched
 from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
 
 STEP = 0.88e-3
