@@ -64,9 +64,7 @@ def test_a_right_motion_is_not_outside_at_another_horizon_or_tolerance(asked: tu
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "asked", [one for one in EVERY if one[:3] not in LATE and not (one[0] in ENDED and one[2] > 1.0)], ids=str
-)
+@pytest.mark.parametrize("asked", EVERY, ids=str)
 def test_no_right_engine_is_outside_at_any_horizon_or_tolerance(asked: tuple[Any, ...]) -> None:
     assert outside(*asked, *FOLLOW) == []
 
