@@ -167,7 +167,7 @@ class Points:
     """Rows as Pinocchio's constraints of three components, the normal last, at positions q.
 
     A contact is a point without friction between its shapes. A coordinate that is held is an
-    anchor where it has its value, whose other components the joint keeps anyway.
+    anchor, whose other components the joint keeps anyway; where it lies, velocities do not tell.
 
     Attributes:
         steady: whether M and the constraints' Jacobians are the same everywhere: where all
@@ -179,7 +179,7 @@ class Points:
         self.steady = straight and all(joint.type == "slide" for joint in scene.joints)
         loops = [loop for loop in scene.loops if loop.type == "joint" and not loop.second]
         self.contacts, self.placed = Contacts(by_shapes(scene)), placed
-        self.anchors = [self._anchor(model.getJointId(loop.first), loop.polynomial[0]) for loop in loops]
+        self.anchors = [self._anchor(model.getJointId(loop.first)) for loop in loops]
 
     def __call__(self, q: Floats, rows: Sequence[int]) -> list[Any]:
         """Return the constraints of some rows."""
@@ -198,11 +198,11 @@ class Points:
             found.append(pin.ConstraintModel(contact))
         return found
 
-    def _anchor(self, joint: int, value: float) -> Any:
+    def _anchor(self, joint: int) -> Any:
         """Return the point of a slide that is held, with the third axis along it."""
         kind = self.model.joints[joint]
         moved = kind.createData()
-        kind.calc(moved, np.array([value]))
+        kind.calc(moved, np.zeros(1))
         turn = pin.SE3(
             pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(moved.S)[:3]).matrix(), np.zeros(3)
         )

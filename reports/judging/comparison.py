@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
-from crossbody import engines
+from crossbody import cases, engines
 from crossbody.cases import Case, Claim, CrossbodyError, InvalidValue, Limit, Trajectory, UnknownName
 from crossbody.cases.arguments import instance, shown
 from crossbody.cases.arrays import Floats
-from crossbody.cases.defaults import limits_of
+from crossbody.cases.defaults import TOLERANCE, limits_of
 from crossbody.engines import Run
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
@@ -21,6 +21,7 @@ from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of,
 from crossbody.reports.judging.stored import (
     SAME_END,
     Deviations,
+    changed,
     compared_until,
     defaults,
     deviations,
@@ -30,6 +31,7 @@ from crossbody.reports.judging.stored import (
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import (
     COLUMNS,
+    IDENTITIES,
     ROUNDING,
     Regression,
     Verdict,
@@ -51,11 +53,16 @@ GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
     "slip_times", "stick_times", "friction_impulse", "friction_work",
     "largest position (importer)", "largest event_times (importer)",
+    "largest position (step)", "largest event_times (step)",
 })  # fmt: skip
 """Metrics that compare a motion with the truth's, or those of two readers of a file: rounding
 grows as the motion has it."""
 WIDEST = 1e-3
 """To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion."""
+LOOSEST = 1e3
+"""So many times the tolerance that limits are for widen them at most: beyond, an error may be as large as a fault's."""
+EXACT = IDENTITIES - GROWING | {"energy_residual", "gap_residual", "rate_residual"}
+"""Metrics of a run against itself: neither a tolerance nor a horizon widens their limits."""
 SUM = 1e-9
 """To which part of it the parts of an error add up to it."""
 LARGEST = "largest"
@@ -226,6 +233,21 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
             )  # fmt: skip
 
 
+def looser(case: Case, entry: Entry) -> float:
+    """Return how many times the tolerance that limits are for, or the engine's own if that is more, was asked for."""
+    rtol = float(entry.settings.get("rtol", 0.0))
+    if not rtol > TOLERANCE or entry.run is None or entry.engine not in engines.names():
+        return 1.0
+    own = float(engines.load(entry.engine).prepare(case, entry.profile).settings["rtol"])
+    return max(rtol / max(own, TOLERANCE), 1.0)
+
+
+def longer(case: Case) -> float:
+    """Return how many times its own horizon a case of the library is given; 1 where that is longer."""
+    own = cases.load(case.name, case.variant).t_end if changed(case) else case.t_end
+    return max(case.t_end / own, 1.0)
+
+
 class _Judge:
     """Fills in what all rows of one run share."""
 
@@ -234,15 +256,31 @@ class _Judge:
         self.claims: Mapping[str, Claim] = {claim.metric: claim for claim in case.claims}
         self.limits = limits_of(case)
         self.stored: Deviations = deviations(case, entry, truth.trusted)
+        self.looser, self.longer = looser(case, entry), longer(case)
         self.command = f"{command} --engine {entry.engine}:{entry.profile}"
 
     def limit(self, metric: str) -> Limit | None:
-        """The limit that judges this run, wider as errors grow, as far as a fault of a per cent shows."""
-        found, grows = limit_for(self.limits, metric, self.entry.engine, self.entry.profile), self.truth.grows
-        if found is None or metric not in GROWING or grows <= 1.0:
+        """The limit that judges this run: wider as errors grow and tolerances do, while a fault of a per cent shows.
+
+        Those of a case are for its own horizon: each step adds as much.
+        """
+        found = limit_for(self.limits, metric, self.entry.engine, self.entry.profile)
+        if found is None or metric in EXACT:
             return found
-        why = f"{found.why}; the motion makes errors {grows:.2g} times as large as free flight does"
-        return replace(found, value=max(found.value, min(found.value * grows, WIDEST)), why=why)
+        grows, longer, looser = self.truth.grows, self.longer, min(self.looser, LOOSEST)
+        times, why = longer * looser, found.why
+        if metric in GROWING:
+            times *= grows * longer  # what an error makes of the speed goes on
+            why += f"; the motion makes errors {grows:.2g} times as large as free flight does" if grows > 1.0 else ""
+        why += f"; the horizon is {longer:.3g} times the case's own" if longer > 1.0 else ""
+        why += f"; {self.looser:.3g} times that tolerance was asked for" if looser > 1.0 else ""
+        return replace(found, value=max(found.value, min(found.value * times, WIDEST)), why=why)
+
+    def told(self, metric: str, word: Word, why: str) -> tuple[Word, str]:
+        """What is said of a number: one outside is not judged where a tolerance was asked for that hides any fault."""
+        if word is not Word.OUTSIDE or self.looser <= LOOSEST or metric in EXACT:
+            return word, why
+        return Word.INFO, "The tolerance that was asked for allows errors as large as that of a fault."
 
     def row(self, metric: str, value: float, unit: str, verdict: Word, why: str, **more: Any) -> Verdict:
         return Verdict(
@@ -256,6 +294,8 @@ class _Judge:
         """One number: its word by physics and method, and by the stored run."""
         claim, limit, stored = self.claims.get(metric), self.limit(metric), self.stored.get(metric)
         word, why = judge(value, limit, claim, stored)
+        if math.isfinite(value):
+            word, why = self.told(metric, word, why)
         if word is Word.INFO and limit is None:
             shown = limit_for(self.limits, "*", self.entry.engine, self.entry.profile)
             word, why = as_stored(value, shown, stored)
@@ -285,8 +325,9 @@ class _Judge:
             return self.row(metric, math.nan, unit, Word.INFO, f"{why} Known: {limit.known}.")
         if claim is not None:
             why += f" {claim.expected:g} claimed: {claim.source}."
+        word, why = self.told(metric, word, known if word is Word.EXPECTED else why)
         return self.row(
-            metric, math.nan, unit, word, known if word is Word.EXPECTED else why, expected=expected,
+            metric, math.nan, unit, word, why, expected=expected,
             tier=self.truth.tier.value if claim is None else claim.tier.value,
         )  # fmt: skip
 

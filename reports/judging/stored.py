@@ -57,6 +57,11 @@ def compared_until(case: Case) -> float:
     return float(stored.get("compared", case.t_end)) if stored.get("parameters") == _digest(case) else math.nan
 
 
+def changed(case: Case) -> bool:
+    """Whether runs of a case are stored, with other parameters: its limits are for those."""
+    return case.label in _table() and math.isnan(compared_until(case))
+
+
 def differing(case: Case, entry: Entry) -> frozenset[str]:
     """What was looked at in the stored run of that variant, engine and profile, whatever its parameters."""
     run = _table().get(case.label, {}).get("runs", {}).get(f"{entry.engine}:{entry.profile}")

@@ -17,6 +17,7 @@ from crossbody.cases.trajectory import Ledger
 from crossbody.reference import ahead
 from crossbody.reports.judging.answers import Answers
 from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, motion, tight
+from crossbody.reports.judging.stored import changed
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
@@ -240,13 +241,15 @@ def _arbitrary(truth: Truth, second: Trajectory, case: Case) -> float:
 
 
 def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], limit: float) -> tuple[Floats, Floats]:
-    """Instants (n,), s, and by how much more than in free flight errors of a scene's start have grown until then (n,).
+    """Instants (n,), s, and by how much more than in free flight errors of the start have grown until then (n,).
+
+    Of a scene, and of any case with other parameters than those that its limits are for.
 
     Its velocities are put off, on its rows. A neighbour that gets less far, or takes longer than
     a limit, s, tells of growth as far as it gets: limits are the stricter for what is not known.
     """
     fastest = max(float(np.max(np.abs(truth.v), initial=0.0)), RESTS)  # what balances falls, however slowly
-    if not case.general or not truth.outcome.ok or not fastest < math.inf:
+    if not (case.general or changed(case)) or not truth.outcome.ok or not fastest < math.inf:
         return np.array([0.0, case.t_end]), np.ones(2)
     from crossbody.engines.equations import system_of
 

@@ -120,11 +120,10 @@ def guard(truth: Trajectory, case: Case, pair: int, slides: bool) -> tuple[Calla
     exact = rubbing(truth, case)
     assert exact is not None
     own = exact.pair == pair
-    like = exact.dry == exact.dry[own][0]
     if slides:
-        known = BOUND * float(np.max(exact.mu * exact.normal * like, initial=0.0))
+        known = BOUND * float(np.max(exact.mu * exact.normal * own, initial=0.0))
     else:
-        known = SLIP * max(float(np.max(np.linalg.norm(exact.slip, axis=-1) * like, initial=0.0)), RESTS)
+        known = SLIP * max(float(np.max(np.linalg.norm(exact.slip, axis=-1) * own, initial=0.0)), RESTS)
 
     def values(run: Trajectory) -> Floats:
         found = rubbed(run, case)

@@ -51,24 +51,31 @@ def event_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """
     if np.isnan([event.t for event in run.events]).any():
         return math.nan
-    pairs, rows = matched(truth, run), case.law.unilateral
-    gap = KNOWN * _widest(truth.trajectory, rows)
-    push = KNOWN * float(np.nanmax(np.abs(truth.trajectory.lam[:, rows]), initial=0.0))
-    shifts = [off(truth, a.touch, b.touch, _of_row("gap", a.row, (Mode.FREE,)), gap) for a, b in pairs]
-    shifts += [_let_go(truth, a, b, push) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+    pairs = matched(truth, run)
+    shifts = [off(truth, a.touch, b.touch, *_of_row(truth, "gap", a.row, (Mode.FREE,))) for a, b in pairs]
+    shifts += [_let_go(truth, a, b) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
     return max(shifts, default=None)
 
 
-def _of_row(signal: str, row: int, modes: tuple[Mode, ...]) -> Callable[[Trajectory], Floats]:
-    """Return the signal (n,) of a row of a motion, infinite in other modes: there others bring events about."""
-    return lambda motion: np.where(np.isin(motion.mode[:, row], modes), getattr(motion, signal)[:, row], np.inf)
+def _of_row(
+    truth: Truth, signal: str, row: int, modes: tuple[Mode, ...]
+) -> tuple[Callable[[Trajectory], Floats], float]:
+    """Return the signal (n,) of a row of a motion, and to what it is known: a part of its own largest in the truth.
+
+    It is infinite in other modes: there others bring events about.
+    """
+    largest = float(np.nanmax(np.abs(getattr(truth.trajectory, signal)[:, row]), initial=0.0))
+    return (
+        lambda motion: np.where(np.isin(motion.mode[:, row], modes), getattr(motion, signal)[:, row], np.inf),
+        KNOWN * largest,
+    )
 
 
-def _let_go(truth: Truth, a: Contact, b: Contact, known: float) -> float:
+def _let_go(truth: Truth, a: Contact, b: Contact) -> float:
     """How far a release is off, s; contacts in no time end with their touch, which tells how far they are."""
     if a.release == a.touch and b.release == b.touch:
         return 0.0
-    return off(truth, a.release, b.release, _of_row("lam", a.row, CLOSED), known)
+    return off(truth, a.release, b.release, *_of_row(truth, "lam", a.row, CLOSED))
 
 
 def _widest(run: Trajectory, rows: NDArray[np.bool_]) -> float:

@@ -52,7 +52,9 @@ def test_estimates_scatter_together_as_the_noise_goes_through_their_weights(layo
     """Their correlations are those of L^T V L; overlapping windows are never taken for white."""
     for correlation in (0.0, 0.7):
         Q, L, residual = drawn(seed, layout, correlation)
-        found = scatter(Q, L, residual, layout)
+        found, smaller = scatter(Q, L, residual, layout), scatter(Q, 1e-3 * L, residual, layout)
+        assert smaller.freedom == pytest.approx(found.freedom, rel=1e-9), "units of estimates tell nothing"
+        assert smaller.half == pytest.approx(1e-3 * found.half, rel=1e-9)
         if layout.overlap:
             assert "overlap" in found.how
         if found.how == "white residuals":

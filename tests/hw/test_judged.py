@@ -43,13 +43,17 @@ class Linear:
         return 3e-9
 
 
-def drawn(seed: int) -> tuple[Search, Linear, Linear]:
-    """A search that has ended at the least squares of noise that is five times as large in the second channel."""
+def drawn(seed: int, alike: float = 0.0) -> tuple[Search, Linear, Linear]:
+    """A search that has ended at the least squares of noise that is five times as large in the second channel.
+
+    Its second parameter does the same as so many times the first, but for a hundredth, if `alike` is not 0.
+    """
     rng, layout, true = np.random.default_rng(seed), Layout(samples=SAMPLES, k=2), np.array([0.3, 0.2, 0.01])
     n = 2 * sum(SAMPLES)
     sides = []
     for _ in range(2):
         A = rng.normal(size=(n, 3)) * (1.0, 2.0, 30.0) + rng.normal(size=3) * (0.5, 0.0, 9.0)
+        A[:, 1] = alike * A[:, 0] + 1e-2 * A[:, 1] if alike else A[:, 1]
         sides.append(Linear(A, A @ true + np.where(layout.channels() == 0, 1e-3, 5e-3) * rng.normal(size=n), layout))
     fitted, held = sides
     x = np.linalg.lstsq(fitted.A, fitted.b, rcond=None)[0]
@@ -99,6 +103,13 @@ def test_a_fit_is_linear_least_squares(seed: int) -> None:
     np.testing.assert_allclose(fit.correlation, cov / np.outer(std, std), atol=1e-6)
     assert (fit.kept, fit.unseen, fit.fitted, fit.held, fit.evaluations) == ((), (), (0, 2, 3, 5), (1, 4), 7)
     assert "3.0e-09" in fit.sensitivities
+
+
+@pytest.mark.parametrize("alike", [2.0, -2.0, 0.0])
+def test_parameters_that_do_the_same_or_the_opposite_are_told(alike: float) -> None:
+    fit = judged(drawn(0, alike)[0])
+    assert alike == 0.0 or fit.correlation[1, 0] * np.sign(alike) < -0.999
+    assert [f"{FREE[1]} and {FREE[0]} can hardly be separated" in " ".join(fit.warnings)] == [alike != 0.0]
 
 
 @pytest.mark.parametrize("seed", range(8))

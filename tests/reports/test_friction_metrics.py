@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from importlib.util import find_spec
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint
 from crossbody.reference import simulate
 from crossbody.reports import metrics
 from crossbody.reports.measuring import friction
@@ -146,6 +148,47 @@ def test_places_of_one_pair_are_one_beside_pairs_without_friction() -> None:
     assert found is not None
     assert len(found.pair) == len(found.rows) > 1
     assert len(set(found.pair.tolist())) == 1
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_pair_that_comes_off_goes_on_with_what_it_did_last(seed: int) -> None:
+    """A place at 1 m/s that is in modes at random: it changes where it slides or holds as it did not before."""
+    rng = np.random.default_rng(seed)
+    modes = [Mode.FREE, *rng.choice([Mode.FREE, Mode.STICK, Mode.SLIP], 12).tolist()]
+    events = [Event(t=0.04 * k, contact=0, before=Mode(a), after=Mode(b)) for k, (a, b) in enumerate(pairwise(modes))]
+    touches = [(event.t, event.after == Mode.SLIP) for event in events if event.after != Mode.FREE]
+    moves = replace(RUN, v=np.tile([1.0, 0, 0, 0, 0, 0], (len(RUN.t), 1)), events=tuple(events))
+    wanted = [(0, t, slides) for (_, did), (t, slides) in pairwise(touches) if did != slides]
+    assert friction.turned(moves, CASE) == tuple(wanted)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_brings_a_change_about_is_the_fastest_slip_or_the_nearest_bound(seed: int) -> None:
+    """Of a box on its corners, which moves and turns at random, beside a joint with dry friction: alike in both."""
+    rng, half = np.random.default_rng(seed), (0.2, 0.15, 0.1)
+    scene, guide = box_on_floor(MU, half=half), Joint(name="x", body="rod", type="slide", axis=(1, 0, 0))
+    scene = scene.replace(
+        bodies=(*scene.bodies, Body(name="rod", mass=1.0)),
+        joints=(*scene.joints, replace(guide, friction_loss=2.0)),
+        gravity=(0.0, 0.0, 0.0),
+    )
+    case = case_of(scene, q0=[0, 0, half[2], 1, 0, 0, 0, 0], t_end=0.1)
+    v = np.array([*rng.normal(size=2), 0, 0, 0, *rng.normal(size=2)])
+    run = engines.load("reference").prepare(case, "compiled").run()
+    first = {name: getattr(run, name)[:1] for name in ("t", "q", "gap", "energy")}
+    lam, mode = rng.uniform(0.5, 1.0, (1, run.lam.shape[1])), np.full((1, run.mode.shape[1]), Mode.STICK)
+    one = replace(run, **first, v=v[None], lam=lam, mode=mode)
+    found = rubbing(one, case)
+    assert found is not None
+    corners = np.array(list(product(*[(-1.0, 1.0)] * 3)))[:, :2] * half[:2]
+    speeds = np.hypot(v[0] - v[5] * corners[:, 1], v[1] + v[5] * corners[:, 0])
+    assert np.sort(np.linalg.norm(found.slip[0], axis=-1)) == pytest.approx(np.sort([*speeds, abs(v[6])]))
+    below = np.where(found.dry, 2.0, MU * one.lam[0, found.rows]) - np.linalg.norm(found.force[0], axis=-1)
+    for pair in (0, 1):
+        own = found.pair == pair
+        slip = [speeds.max(), abs(v[6])][pair]
+        assert friction.guard(one, case, pair, slides=False)[0](one) == pytest.approx(slip)
+        assert friction.guard(one, case, pair, slides=True)[0](one) == pytest.approx(below[own].min())
 
 
 @pytest.mark.parametrize("drift", [-0.7, 0.0, 0.3])

@@ -1,52 +1,106 @@
-"""Any horizon of a case is judged fairly: what is right at the default one is not outside at another."""
+"""Any horizon and tolerance is judged fairly: what is right at the default ones is not outside at others."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import Tier
+from crossbody.cases import Case, Tier
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.mechanisms.soft.claims import STEP
 from crossbody.cases.mechanisms.soft.form import fastest
 from crossbody.cases.mechanisms.soft.scene import numbers
-from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.comparison import EXACT, GROWING, judged
 from crossbody.reports.judging.reach import tight
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.verdict import limit_for
+from crossbody.reports.judging.verdict import Verdict, limit_for
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.runs import choice, jobs
 
 MAZES = cases.variants("ball_maze")
-FACTORS = (0.1, 0.5, 2.0)
-EVERY = [(name, variant, factor) for name in cases.names() for variant in cases.variants(name) for factor in FACTORS]
-LATE = ("ball_maze", "solve", 2.0)
-"""Two and a half minutes of rest in the centre: nothing new."""
+FACTORS = (0.1, 0.5, 2.0, 6.0)
+TOLERANCES = (1e-12, 1e-8, 1e-5, 1e-3)
+NO_LONGER = ("ball_maze:solve", *(f"rocking_block:{variant}" for variant in cases.variants("rocking_block")))
+"""What is two and a half minutes of rest in the centre then, and what a closed form ends."""
+EVERY = [(name, variant) for name in cases.names() for variant in cases.variants(name)]
+LONGER = [(*one, factor) for one in EVERY for factor in FACTORS if factor < 1.0 or ":".join(one) not in NO_LONGER]
+FOLLOW = ("reference:compiled", "mujoco:matched", "pinocchio:law")
+"""Engines that follow the case's law, or whose known properties say why not."""
 QUICK = (
-    ("ball_maze", "outside", 0.1, "reference:compiled"), ("red_body", "frozen", 2.0, "reference:compiled"),
-    ("soft_contact", "axis", 0.1, "reference:compiled"), ("delta_tracking", "circle", 0.1, "pinocchio:law"),
+    ("ball_maze", "outside", 0.1, 0.0, "reference:compiled"), ("red_body", "frozen", 2.0, 0.0, "reference:compiled"),
+    ("soft_contact", "axis", 0.1, 0.0, "reference:compiled"), ("delta_tracking", "circle", 0.1, 0.0, "pinocchio:law"),
+    ("red_body", "resolved", 6.0, 0.0, "pinocchio:law"), ("bouncing_ball", "elastic", 6.0, 0.0, "mujoco:matched"),
+    ("bouncing_ball", "listing", 1.0, 1e-8, "pinocchio:law"), ("ball_maze", "inside", 1.0, 1e-5, "reference:compiled"),
+    ("sliding_block", "flat", 1.0, 1e-8, "reference:compiled"),
+    ("ball_maze", "outside", 1.0, 1e-3, "reference:compiled"),
 )  # fmt: skip
 """What was outside once, or rests, and costs little."""
 
 
-def outside(name: str, variant: str, factor: float, engine: str) -> list[tuple[str, str, float, str]]:
-    case = cases.load(name, variant, t_end=factor * cases.load(name, variant).t_end)
-    found = jobs.run_case(case, choice.picks((engine,)), refine=False)
-    rows = judged(case, found.entries, found.truth, "")
-    return [(row.profile, row.metric, row.value, row.why) for row in rows if row.verdict in ("outside", "crashed")]
+def rows(
+    name: str, variant: str, factor: float, rtols: Sequence[float], *wanted: str
+) -> Iterator[tuple[Case, list[Verdict]]]:
+    """Yield a case at a part of its horizon, and what is said of engines, with each tolerance or their own for 0."""
+    case = cases.load(name, variant)
+    case = case if factor == 1.0 else cases.load(name, variant, t_end=factor * case.t_end)
+    truth = None
+    for rtol in rtols:
+        found = jobs.run_case(case, choice.picks(wanted), rtol=rtol or None, refine=False, truth=truth)
+        truth = None if case.general else found.truth
+        yield case, judged(case, found.entries, found.truth, "")
 
 
-@pytest.mark.parametrize(("name", "variant", "factor", "engine"), QUICK)
-def test_a_right_motion_is_not_outside_at_another_horizon(name: str, variant: str, factor: float, engine: str) -> None:
-    assert outside(name, variant, factor, engine) == []
+def outside(*asked: Any) -> list[tuple[str, str, float, str]]:
+    found = [row for _, each in rows(*asked) for row in each if row.verdict in ("outside", "crashed")]
+    return [(row.profile, row.metric, row.value, row.why) for row in found]
+
+
+@pytest.mark.parametrize(("name", "variant", "factor", "rtol", "engine"), QUICK)
+def test_a_right_motion_is_not_outside_at_another_horizon_or_tolerance(
+    name: str, variant: str, factor: float, rtol: float, engine: str
+) -> None:
+    assert outside(name, variant, factor, [rtol], engine) == []
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "variant", "factor"), [one for one in EVERY if one != LATE])
-def test_no_integrator_of_ours_is_outside_at_any_horizon(name: str, variant: str, factor: float) -> None:
-    assert outside(name, variant, factor, "reference") == []
+@pytest.mark.parametrize(("name", "variant", "factor"), LONGER)
+def test_no_engine_that_follows_the_law_is_outside_at_any_horizon(name: str, variant: str, factor: float) -> None:
+    assert outside(name, variant, factor, [0.0], *FOLLOW) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "variant"), EVERY)
+def test_no_engine_that_follows_the_law_is_outside_at_any_tolerance(name: str, variant: str) -> None:
+    assert outside(name, variant, 1.0, TOLERANCES, *FOLLOW[::2]) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "rtol", "wider", "growing"),
+    [
+        (1.0, 0.0, 1, 1),
+        (1.0, 1e-10, 1, 1),
+        (0.5, 0.0, 1, 1),
+        (1.0, 1e-8, 10, 10),
+        (1.5, 0.0, 1.5, 2.25),
+        (1.5, 1e-8, 15, 22.5),
+    ],
+)
+def test_limits_are_as_they_stand_but_for_what_was_asked_for(
+    factor: float, rtol: float, wider: float, growing: float
+) -> None:
+    """Errors of a tolerance are as large as it, each step adds its own, and what a position is off by goes on."""
+    ((case, found),) = rows("bouncing_ball", "listing", factor, [rtol], "reference:compiled")
+    for row in found:
+        stands = limit_for(limits_of(case), row.metric, row.engine, row.profile)
+        if stands is None:
+            continue
+        times = 1.0 if row.metric in EXACT else growing if row.metric in GROWING else wider
+        assert row.limit == pytest.approx(max(stands.value, min(stands.value * times, 1e-3)), rel=1e-9), row.metric
 
 
 @pytest.mark.parametrize(

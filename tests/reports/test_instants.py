@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from friction_scenes import G, box_body, box_on_floor, stack
+from friction_scenes import HALF, G, box_body, box_on_floor, pair, stack
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Joint, RowLaw, Scene
+from crossbody.cases.scene import Joint, RowLaw, Scene, Shape
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import with_both_sides
 from crossbody.reports.measuring.instants import off
@@ -34,11 +34,24 @@ def measured(name: str, case: Case, exact: Trajectory, found: Trajectory) -> flo
     return metrics.load(name).measure(from_run(exact, Tier.A, "itself"), found, case)
 
 
-def slid(less: float, tilt: float, speed: float) -> tuple[Case, Trajectory]:
-    """Return a block on a slope that loses `less` m/s^2, and stops."""
+def slid(less: float, tilt: float, speed: float, beside: float = 0.0) -> tuple[Case, Trajectory]:
+    """Return a block on a slope that loses `less` m/s^2, and stops; one that weighs and slides more beside it."""
     scene = box_on_floor(np.tan(tilt) + less / (G * np.cos(tilt)), tilt=tilt)
-    case = case_of(scene, q0=[0, 0, 0.1, 1, 0, 0, 0], v0=[speed, 0, 0, 0, 0, 0], t_end=1.5)
+    q0, v0 = np.array([0, 0, 0.1, 1, 0, 0, 0]), np.array([speed, 0, 0, 0, 0, 0])
+    if beside:
+        scene, q0, v0 = and_another(scene, beside), np.append(q0, q0), np.append(v0, beside * v0)
+    case = case_of(scene, q0=q0, v0=v0, t_end=1.5)
     return case, run(case)
+
+
+def and_another(scene: Scene, mass: float) -> Scene:
+    """Return a scene with one more block on a floor of its own, which nothing joins to the others."""
+    floor, shape = Shape(name="own floor", type="plane"), Shape(name="other", body="other", type="box", size=HALF)
+    return scene.replace(
+        bodies=(*scene.bodies, box_body("other", HALF, mass)), shapes=(*scene.shapes, floor, shape),
+        joints=(*scene.joints, Joint(name="other", body="other", type="free")),
+        pairs=(*scene.pairs, pair("own floor", "other", 0.1)),
+    )  # fmt: skip
 
 
 def moved(motion: Trajectory, after: Mode, late: float) -> Trajectory:
@@ -63,9 +76,10 @@ def test_a_stop_is_known_as_well_as_the_slip_there(seed: int) -> None:
 
 
 @pytest.mark.parametrize("late", [2e-5, -2e-5, 1e-3, 0.4])
-def test_a_stop_that_the_slip_does_not_explain_is_off_in_full(late: float) -> None:
+@pytest.mark.parametrize("beside", [0.0, 1e4])
+def test_a_stop_that_the_slip_does_not_explain_is_off_in_full(late: float, beside: float) -> None:
     """At 1e-3 m/s^2 from 1e-3 m/s: 1e-5 of it are lost in 1e-5 s, and .4 s later the block has long held."""
-    case, exact = slid(1e-3, 0.3, 1e-3)
+    case, exact = slid(1e-3, 0.3, 1e-3, beside)
     assert measured("stick_times", case, exact, moved(exact, Mode.STICK, late)) == pytest.approx(abs(late), rel=1e-9)
 
 
@@ -85,9 +99,16 @@ def test_a_stop_that_is_missing_or_of_other_shapes_has_no_number() -> None:
 
 
 @pytest.mark.parametrize(("late", "part"), [(2e-6, 0.8), (-2e-6, 0.8), (3e-6, 1.2), (-0.1, 4e4)])
-def test_a_slip_is_known_as_well_as_friction_there(late: float, part: float) -> None:
+@pytest.mark.parametrize("beside", [0.0, 1e4])
+def test_a_slip_is_known_as_well_as_friction_there(late: float, part: float, beside: float) -> None:
     """A spring that a belt stretches by .4 of the bound a second: in 2.5e-6 s by as much as friction may be off."""
     case = cases.load("block_on_belt", stiffness=0.4 * 0.3 * G / 0.1, t_end=3.0)
+    if beside:
+        assert case.scene is not None
+        case = case_of(
+            and_another(case.scene, beside), q0=[*case.q0, 0, 0, 0.1, 1, 0, 0, 0], v0=[*case.v0, *[0.0] * 6],
+            t_end=3.0, inputs=case.inputs,
+        )  # fmt: skip
     exact = run(case)
     wanted = 1e-6 * part if part < 1.0 else abs(late)
     assert measured("slip_times", case, exact, moved(exact, Mode.SLIP, late)) == pytest.approx(wanted, rel=1e-3)
@@ -97,8 +118,8 @@ def test_a_slip_is_known_as_well_as_friction_there(late: float, part: float) -> 
 def test_a_touch_is_known_as_well_as_the_gap_there(seed: int) -> None:
     """A mass on a spring that comes near the end of its way slowly, from farther away by less than gaps may be off."""
     rng = np.random.default_rng(seed)
-    least, stiff = 10.0 ** rng.uniform(-8.0, -3.5), rng.uniform(1.0, 4.0)
-    slide = Joint(name="x", body="a", type="slide", axis=(1, 0, 0), stiffness=(stiff, 0, 0), range=(least - 1.0, 9.0),
+    least, stiff, far = 10.0 ** rng.uniform(-8.0, -3.5), rng.uniform(1.0, 4.0), 10.0 ** rng.uniform(0.5, 6.0)
+    slide = Joint(name="x", body="a", type="slide", axis=(1, 0, 0), stiffness=(stiff, 0, 0), range=(least - 1.0, far),
                   law=RowLaw(a0=1e4, a1=200.0))  # fmt: skip
     scene = Scene(bodies=(box_body("a", (0.1, 0.1, 0.1)),), joints=(slide,), gravity=(0.0, 0.0, 0.0))
 
@@ -107,7 +128,7 @@ def test_a_touch_is_known_as_well_as_the_gap_there(seed: int) -> None:
         return case, run(case)
 
     case, exact = thrown(1.0)
-    known = PART["touch"] * float(np.max(exact.gap))
+    known = PART["touch"] * float(np.max(exact.gap[:, 0]))  # whatever the other end's
     for farther in (0.1 * least, 1e-7):
         found = thrown(1.0 + farther)[1]
         late = abs(found.events[0].t - exact.events[0].t)

@@ -99,6 +99,10 @@ CREEPS = (
 )
 NEAR = 0.05  # part of a predicted creep by which the measured one may be off
 NOTHING: Mapping[tuple[str, str], float] = MappingProxyType({})
+SOFT = Limit(
+    metric="*", engine="mujoco", profile="default", covers_none=True, known="MuJoCo's own soft contacts and step"
+)  # fmt: skip
+"""What takes it outside where nothing rubs: where something does, that of every case with friction stands."""
 HELD = "friction holds: what is left of a slip decays as a gap does"
 
 
@@ -116,6 +120,7 @@ def limits(
         units={name: one.unit for name, one in parameters.items()},
         limits=(
             *case.limits, Limit(metric="creep_speed", value=held, why=HELD), *_predicted(creeps, held),
+            *(() if case.rubs else (SOFT,)),
         ),
     )  # fmt: skip
 

@@ -51,15 +51,17 @@ class Motion:
         energy: q (n, nq), v (n, nv) -> kinetic and potential energy (n, 2), J.
         t_end: horizon, s.
         before: mode of all rows before the first stage.
+        held: how many of them, which stand first, are always on and have none.
     """
 
     def __init__(
         self, stages: Sequence[Stage], normals: int, energy: Callable[[Floats, Floats], Floats], t_end: float,
-        before: Mode = Mode.FREE,
+        before: Mode = Mode.FREE, held: int = 0,
     ) -> None:  # fmt: skip
         stages = [stage for stage in stages if stage.start <= t_end]
         self.stages, self.energy, self.starts = stages, energy, np.array([stage.start for stage in stages])
-        free = Stage(0.0, (int(before),) * len(stages[0].modes), stages[0].at)
+        modes = stages[0].modes
+        free = Stage(0.0, (*modes[:held], *[int(before)] * (len(modes) - held)), stages[0].at)
         self.events = tuple(
             Event(t=b.start, contact=i, before=Mode(b_), after=Mode(a_))
             for a, b in pairwise((free, *stages))
@@ -67,12 +69,13 @@ class Motion:
             if b_ != a_ or (b is not stages[0] and a_ == Mode.SLIP)
         )
 
-        self.normals, self.t_end = normals, t_end
+        self.held, self.normals, self.t_end = held, normals, t_end
 
     @property
     def presses(self) -> bool:
         """Whether no place would have to pull: else what lies on several tips."""
-        return self.normals == 1 or bool((self(np.array([0.0, self.t_end])).lam[:, : self.normals] >= 0.0).all())
+        ends = self(np.array([0.0, self.t_end])).lam[:, self.held : self.normals]
+        return self.normals == 1 or bool((ends >= 0.0).all())
 
     def __call__(self, t: Floats) -> Trajectory:
         """Return the motion at times (n,), s; an event's instant that stands twice is before and after it."""

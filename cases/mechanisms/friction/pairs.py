@@ -10,9 +10,11 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.mechanisms.friction.blocks import CORNERS
 from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage, shares
-from crossbody.cases.mechanisms.friction.scene import FINGER, HIGH, LIFTED, LOW, MASS
+from crossbody.cases.mechanisms.friction.scene import FINGER, GRIP, HIGH, LIFTED, LOW, MASS, UNEVEN
 from crossbody.cases.trajectory import Mode
 
+UP_ON_BOX = np.array([-8.0, -15.0, 17.0, 0.0]) / 17.0
+"""Upwards along the tangential rows of either side of a box: Frisvad's frames, in axes that no symmetry of it meets."""
 BASE = np.flatnonzero(CORNERS[:, 2] < 0.0)  # corners on which a box lies
 
 
@@ -114,19 +116,30 @@ def stack(p: Mapping[str, float]) -> Motion:
 
 
 def held(p: Mapping[str, float]) -> Motion:
-    """Motion of a weight between two fingers: q = (x, z, left, right), rows (n1, n2, four tangential)."""
-    g, press, most = p["gravity"], p["press"], p["mu"] * p["press"]
-    slips = MASS * g > 2.0 * most
+    """Motion of a weight between two fingers: q = (x, z, left, right), rows (n1, n2, four tangential).
+
+    Those of a box that springs press on begin with what mirrors the fingers, which passes on what the left spring has
+    over the press; a third normal one is that between the fingers.
+    """
+    g, press, most, sprung = p["gravity"], p["press"], p["mu"] * p["press"], p["stiffness"] > 0.0
+    slips, rubs = MASS * g > 2.0 * most, 4 * (most > 0.0)
     force = most if slips else 0.5 * MASS * g
     falls = g - 2.0 * force / MASS if slips else 0.0
+    up = UP_ON_BOX if sprung else np.array([0.0, -1.0, 0.0, -1.0])
+    ends = ([-2.0 * UNEVEN * press], [0.0]) if sprung else ([], [])
+    lam = np.concatenate([ends[0], [press, press], ends[1], force * up[:rubs]])
+    gap = np.where(np.arange(len(lam)) == 3, 2.0 * GRIP, 0.0) if sprung else np.zeros(len(lam))
+    kept = sum((2.0 * (0.5 + way * UNEVEN) * press) ** 2 for way in (1, -1)) / (2.0 * p["stiffness"]) if sprung else 0.0
+    mode = Mode.CONTACT if not rubs else Mode.SLIP if slips else Mode.STICK
+    modes = (*[int(Mode.BILATERAL)] * sprung, *[int(mode)] * 2, *[int(Mode.FREE)] * sprung, *[int(mode)] * rubs)
 
     def at(s: Floats) -> Rows:
-        q, v, lam = np.zeros((len(s), 4)), np.zeros((len(s), 4)), np.zeros((len(s), 6))
+        q, v = np.zeros((len(s), 4)), np.zeros((len(s), 4))
         q[:, 1], v[:, 1] = -0.5 * falls * s**2, -falls * s
-        lam[:, :2], lam[:, [3, 5]] = press, -force
-        return q, v, np.zeros((len(s), 6)), lam
+        return q, v, np.tile(gap, (len(s), 1)), np.tile(lam, (len(s), 1))
 
     def energy(q: Floats, v: Floats) -> Floats:
-        return np.stack([0.5 * MASS * v[:, 1] ** 2, MASS * g * q[:, 1] + (MASS + 2.0 * FINGER) * g * LIFTED], axis=1)
+        height = (MASS + 2.0 * FINGER) * g * LIFTED + kept
+        return np.stack([0.5 * MASS * v[:, 1] ** 2, MASS * g * q[:, 1] + height], axis=1)
 
-    return Motion([Stage(0.0, (int(Mode.SLIP if slips else Mode.STICK),) * 6, at)], 2, energy, p["t_end"])
+    return Motion([Stage(0.0, modes, at)], len(lam) - rubs, energy, p["t_end"], held=int(sprung))

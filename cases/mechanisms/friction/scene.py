@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from crossbody.cases.case import Parameter
-from crossbody.cases.scene import Actuator, Body, Joint, Pair, Push, RowLaw, Scene, Shape, Vector
+from crossbody.cases.scene import Actuator, Body, Joint, Loop, Pair, Push, RowLaw, Scene, Shape, Tendon, Vector
 
 MASS = 1.0
 NUMBERS = {
@@ -24,6 +24,7 @@ LOW, HIGH = (0.4, 0.3, 0.125), (0.1, 0.1, 0.125)
 """Half sides of two blocks, m, whose heights add up without rounding: 1e-17 m would be a gap."""
 GRIP, LIFTED, FINGER = 0.0625, 0.25, 0.125
 """Of fingers: half the width held, m, to which a radius adds without rounding; height, m; mass, kg."""
+UNEVEN = 0.25  # how much more than half of both springs' force the left one has, which a loop passes to the right
 FLOOR = Shape(name="floor", type="plane")
 
 
@@ -130,7 +131,7 @@ def tossed_cube(p: Mapping[str, float]) -> Scene:
 
 
 def gripper(p: Mapping[str, float]) -> Scene:
-    """Return a weight between two fingers that are pushed along x; its sides are planes."""
+    """Return a weight between two fingers that press along x: pushed on its sides, which are planes, or by springs."""
     r, sides = p["radius"], (("left", -1.0), ("right", 1.0))
     fingers = [Body(name=name, mass=FINGER, position=(way * (GRIP + r), 0.0, LIFTED)) for name, way in sides]
     planes = [
@@ -138,7 +139,7 @@ def gripper(p: Mapping[str, float]) -> Scene:
               orientation=(0.5, 0.5, 0.5 * way, 0.5 * way))
         for name, way in sides
     ]  # fmt: skip
-    return Scene(
+    scene = Scene(
         bodies=(Body(name="weight", mass=MASS, position=(0.0, 0.0, LIFTED)), *fingers),
         joints=(
             *(Joint(name=name, body="weight", type="slide", axis=axis) for name, axis in SLIDES[::2]),
@@ -147,4 +148,24 @@ def gripper(p: Mapping[str, float]) -> Scene:
         shapes=(*planes, *(Shape(name=name, body=name, size=(r, 0.0, 0.0)) for name, _ in sides)),
         pairs=tuple(pair(f"side {name}", name, p["mu"], law(p)) for name, _ in sides),
         pushes=tuple(Push(name=f"on {name}", body=name) for name, _ in sides), gravity=field(p),
+    )  # fmt: skip
+    return _sprung(scene, p) if p["stiffness"] > 0.0 else scene
+
+
+def _sprung(scene: Scene, p: Mapping[str, float]) -> Scene:
+    """Return a gripper of a box, whose fingers mirror each other: unequal springs press, that of the right a tendon."""
+    k, (x, z, left, right) = p["stiffness"], scene.joints
+    more, less = ((0.5 + way * UNEVEN) * 2.0 * p["press"] / k for way in (1.0, -1.0))
+    return replace(
+        scene, pushes=(),
+        joints=(x, z, replace(left, stiffness=(k, 0.0, 0.0), rest=(more,)), right),
+        shapes=(Shape(name="box", body="weight", type="box", size=(GRIP, GRIP, LIFTED)), *scene.shapes[2:]),
+        pairs=(
+            pair("left", "box", p["mu"], law(p)), pair("box", "right", p["mu"], law(p)),
+            pair("left", "right", 0.0, law(p)),  # which never meet
+        ),
+        tendons=(Tendon(name="spring", joints=("right",), coefficients=(-1.0,), stiffness=(k, 0.0, 0.0),
+                        rest=(less, less)),),
+        loops=(Loop(name="mirror", type="joint", first="right", second="left", polynomial=(0.0, -1.0, 0.0, 0.0, 0.0),
+                    law=law(p)),),
     )  # fmt: skip
