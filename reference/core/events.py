@@ -314,7 +314,7 @@ def drifts_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
 @compiled
 def stops(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether what fired of contact i is the end of its slip: one with no direction cannot jam in it, as far as known."""
+    """Whether what fired of contact i is the end of its slip: without a direction, as far as known, none jams in it."""
     return bool(w.kind[i] == STOP or (w.kind[i] == JAM and slip(m, w, i, w.rate) <= small_slip(s)))
 
 
