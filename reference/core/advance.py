@@ -171,7 +171,7 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
-            stopped = stopped or w.kind[i] == guards.STOP
+            stopped = stopped or events.stops(s, m, w, i)
             drifts = drifts or w.kind[i] == guards.DRIFT
             if after != b.mode[i]:
                 touched = touched or b.mode[i] == FREE
@@ -219,7 +219,7 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
-            jam = jam or w.kind[i] == guards.JAM
+            jam = jam or (w.kind[i] == guards.JAM and not events.stops(s, m, w, i))
             slips = slips or w.kind[i] == guards.CONE
             released = released or (w.kind[i] == guards.RELEASE and b.mode[i] == SLIP)
     nq, known = s.nq, slips or released

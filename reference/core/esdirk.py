@@ -25,7 +25,7 @@ from crossbody.reference.core.dop853 import (
     watch_guards,
     watch_multipliers,
 )
-from crossbody.reference.core.friction import NOTHING, RESPOND, TURN_PART, ask, has_friction, is_tangent
+from crossbody.reference.core.friction import NOTHING, RESPOND, TURN_PART, TURNING_RATE, ask, has_friction, is_tangent
 from crossbody.reference.core.layout import Model, Work
 
 GAMMA = 0.25
@@ -309,7 +309,8 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
         if code == 1:
             return -1.0
         if code == 2:
-            s.full_jacobian = 1
+            if not (s.frictional and h * ask(TURNING_RATE, s, m, w, NOTHING) > 1.0):
+                s.full_jacobian = 1  # else slips have turned within the step, and a shorter one helps
             s.have_jacobian = 0
             return np.inf
         watch_multipliers(s, m, w, stage)

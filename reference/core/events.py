@@ -313,6 +313,12 @@ def drifts_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
 
 @compiled
+def stops(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether what fired of contact i is the end of its slip: without a direction, as far as known, none jams in it."""
+    return bool(w.kind[i] == STOP or (w.kind[i] == JAM and slip(m, w, i, w.rate) <= small_slip(s)))
+
+
+@compiled
 def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
     """The mode that the fired guard of row i leads to.
 
@@ -333,8 +339,8 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return int(mode[i])  # rows that depended on others do so no more: what that makes of the modes is decided
     if kind in (CONE, DRIFT):
         return SLIP
-    if kind == STOP or (kind == JAM and slip(m, w, i, w.rate) <= small_slip(s)):
-        return STICK  # it has stopped as far as is known, and no direction in which it could jam
+    if stops(s, m, w, i):
+        return STICK
     if kind == JAM:
         return int(mode[i])  # whether any other set of modes goes on is decided with all of them
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:

@@ -259,6 +259,20 @@ class FrictionMachine(LevelMachine):
                 self._become(t, i, Mode.SLIP)
                 self.ways[i] = away / size
 
+    def _reach_bound(self, t: float, q: Floats, v: Floats, i: int, gap: Floats) -> None:
+        """Let contact i slide off against the force that held it, or let go.
+
+        Where its load and its bound vanish together, rounding tells which of them does first: one that presses by no
+        more than sets of modes may be off slides in no direction.
+        """
+        seen, balance = self.weigh(t, q, v)
+        lam, k = balance.forces(pulled=False), seen.at[i]
+        force = lam[[seen.at[w] for w in self.sliding.ways[i]]]
+        if i not in self.sliding.dry and lam[k] * seen.G[k, k] <= self._limit:
+            self._become(t, i, Mode.FREE if gap[i] > 0.0 else Mode.BALLISTIC)
+        else:
+            self._begins[i] = -force / np.linalg.norm(force)
+
     def leave(self, i: int) -> float:
         """By how much a slip may pass zero: one that has just begun is known no better."""
         return (1.0 if i in self.begun else GRAZE) * self.small
@@ -295,12 +309,7 @@ class FrictionMachine(LevelMachine):
             elif tells == "AWAY" and self.modes[i] == Mode.STICK:
                 self._leave_place(t, rate)
             elif tells == "CONE" and self.modes[i] == Mode.STICK:
-                seen, balance = self.weigh(t, q, v)
-                lam = balance.forces(pulled=False)
-                force = lam[[seen.at[w] for w in self.sliding.ways[i]]]
-                size = float(np.linalg.norm(force))
-                if size > 0.0:  # else it is about to let go, and slides nowhere
-                    self._begins[i] = -force / size
+                self._reach_bound(t, q, v, i, gap)
         self._begins = {i: way for i, way in self._begins.items() if self.modes[i] == Mode.STICK}
         if self._joining:
             self._joining |= {

@@ -178,11 +178,12 @@ def rows(t: float, q: Array, v: Array, p: Array, w: Array, idx: Index, na: int, 
             gradient(p, w, at, n, place, H[j])
         elif PAIRED and kind == layout.TANGENT:
             at, x, way, other = slip_of(p, w, idx[j])
-            h[j], Hdv[j] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[1]
+            V, A = slip.apart(p, w, at, x)
+            h[j], Hdv[j] = 0.0 * w[0], slip.velocity(V, A, way)[1]
             slip.columns(p, w, at, x, way, H[j])
             if j + 1 < na and has_partner(p, idx[j], idx[j + 1]):
                 paired = j + 1
-                h[paired], Hdv[paired] = 0.0 * w[0], slip.velocity(p, w, at, x, other)[1]
+                h[paired], Hdv[paired] = 0.0 * w[0], slip.velocity(V, A, other)[1]
                 slip.columns(p, w, at, x, other, H[paired])
         else:
             h[j], _, Hdv[j] = joint_row(q, v, p, idx[j])

@@ -140,13 +140,19 @@ def meeting(p: Array, w: Array, o: int, row: int) -> tuple[Vector, Vector, Vecto
 
 
 @kernels.helper
-def velocity(p: Array, w: Array, o: int, x: Vector, t: Vector) -> tuple[Any, Any]:
-    """Return the velocity of the second shape of the pair at p[o:] over the first along t where they meet, and H'v."""
+def apart(p: Array, w: Array, o: int, x: Vector) -> tuple[Any, Any]:
+    """Return the velocity of the second shape of the pair at p[o:] over the first where they meet, and A_2 - A_1."""
     (a, b, c), (d, e, f) = field(p, w, int(p[o + layout.SECOND + layout.NODE].real), x)
     (g, h, i), (j, k, m) = field(p, w, int(p[o + layout.FIRST + layout.NODE].real), x)
-    rate = t[0][0] * (a - g) + t[1][0] * (b - h) + t[2][0] * (c - i)
-    turned = t[0][1] * (a - g) + t[1][1] * (b - h) + t[2][1] * (c - i)
-    return rate, turned + t[0][0] * (d - j) + t[1][0] * (e - k) + t[2][0] * (f - m)
+    return (a - g, b - h, c - i), (d - j, e - k, f - m)
+
+
+@kernels.helper
+def velocity(V: Any, A: Any, t: Vector) -> tuple[Any, Any]:
+    """Return the part along t of what `apart` tells, and H'v."""
+    rate = t[0][0] * V[0] + t[1][0] * V[1] + t[2][0] * V[2]
+    turned = t[0][1] * V[0] + t[1][1] * V[1] + t[2][1] * V[2]
+    return rate, turned + t[0][0] * A[0] + t[1][0] * A[1] + t[2][0] * A[2]
 
 
 @kernels.helper

@@ -46,10 +46,11 @@ def gaps(t: float, q: Array, v: Array, p: Array, h: Array, hd: Array) -> None:
             h[i], hd[i] = found[0], found[1]
         elif PAIRED and kind == layout.TANGENT:
             at, x, way, other = slip_of(p, w, i)
-            h[i], hd[i] = 0.0 * w[0], slip.velocity(p, w, at, x, way)[0]
+            V, A = slip.apart(p, w, at, x)
+            h[i], hd[i] = 0.0 * w[0], slip.velocity(V, A, way)[0]
             if i + 1 < len(h) and has_partner(p, i, i + 1):
                 paired = i + 1
-                h[paired], hd[paired] = 0.0 * w[0], slip.velocity(p, w, at, x, other)[0]
+                h[paired], hd[paired] = 0.0 * w[0], slip.velocity(V, A, other)[0]
         else:
             h[i], hd[i], _ = joint_row(q, v, p, i)
 

@@ -83,7 +83,8 @@ def _leans(p: Floats, w: Floats, o: int) -> float:
     """
     two = o + pairs.SECOND
     E, X, Y = cap(p, w, two, upside_down(p, w, o)), axis(p, w, two, 0), axis(p, w, two, 1)
-    x, y = slip.velocity(p, w, o, E, X)[0], slip.velocity(p, w, o, E, Y)[0]
+    V, A = slip.apart(p, w, o, E)
+    x, y = slip.velocity(V, A, X)[0], slip.velocity(V, A, Y)[0]
     if x == 0.0 and y == 0.0:
         for k in range(3):
             x, y = x + p[layout.GRAVITY + k] * X[k][0], y + p[layout.GRAVITY + k] * Y[k][0]

@@ -128,3 +128,23 @@ def test_a_contact_that_lets_go_as_it_reaches_its_bound_begins_in_no_direction()
     found = engines.load("reference").prepare(case, "cvode", rtol=1e-9).run()
     assert found.outcome is Outcome.FINISHED, found.message
     assert np.abs(found.v[-1, :3]).max() < 9.81 * case.t_end
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_a_contact_whose_load_and_bound_vanish_together_lets_go(seed: int) -> None:
+    """A loaded cube rocks on its corners: rounding alone says whether the third one slides before it lifts."""
+    rng = np.random.default_rng(seed)
+    mu, rtol = float(rng.uniform(0.2, 2.0)) if seed else 0.6, float(10.0 ** rng.uniform(-10.0, -8.0))
+    other_speeds = 1.0 + (0.05 if seed else 0.0) * rng.normal(size=6)
+    case = replace(
+        cases.load("tossed_cube", "loaded", mu=mu, t_end=4e-4), limits=(),
+        q0=[0.2464601343293342, -0.04715175087348679, 0.052399998974870646, 0.5986480081449835, 0.37632501672784213,
+            0.5986479737289963, -0.37632518873841053],
+        v0=other_speeds * [
+            -7.218975297828439e-07, -1.7761658894767812e-06, 2.7724070748776586e-07, 2.4037519976264005e-13,
+            2.457304684151266e-05, 2.71094185781717e-05],
+    )  # fmt: skip
+    one, other = (engines.load("reference").prepare(case, solver, rtol=rtol).run() for solver in ("compiled", "cvode"))
+    assert other.outcome is Outcome.FINISHED, other.message
+    assert np.abs(one.q[-1] - other.q[-1]).max() < 10.0 * rtol
