@@ -205,10 +205,11 @@ class _Recheck:
         self.looks.begin(guards, self.frozen)
         y = np.hstack([run.q, run.v])
         self.looks.ask(evaluation.BEGIN, run.t[first], y[first])
-        values, errors = np.empty((last - first, *work["grid"].shape)), np.empty((last - first, work["grid"].shape[1]))
+        values, check = (np.empty((last - first, *work[name].shape)) for name in ("grid", "check"))
         for k in range(last - first):
             self.looks.ask(evaluation.GRID, run.t[first + k + 1], y[first + k + 1])
-            values[k], errors[k] = work["grid"], np.abs(work["check"][2:] - work["check"][:2]).max(axis=0)
+            values[k], check[k] = work["grid"], work["check"]
+        errors = np.abs(check[:, 2:] - check[:, :2]).max(axis=1)
         step = np.diff(run.t[first : last + 1])
         places = (np.arange(evaluation.POINTS) + 0.5) / evaluation.POINTS
         t = run.t[first:last, None] + step[:, None] * places
