@@ -50,7 +50,7 @@ def test_the_list_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert told["cases"]["bouncing_ball"].startswith("A ball dropped")
 
 
-RUN = ("run", "bouncing_ball", "--variant", "linear", "-e", "reference:compiled")
+RUN = ("run", "bouncing_ball", "--variant", "linear", "-e", "mujoco:matched")
 
 
 def test_quiet_says_nothing_where_nothing_is_wrong_and_that_alone_else(capsys: pytest.CaptureFixture[str]) -> None:
@@ -60,10 +60,10 @@ def test_quiet_says_nothing_where_nothing_is_wrong_and_that_alone_else(capsys: p
     assert Path("out/index.html").is_file()
     assert call("report", "out", "--quiet") == 0
     assert capsys.readouterr().out == ""
-    assert call(*RUN, "-q", "--set-engine", "rtol=0.1") == 1
+    assert call(*RUN, "-q", "--set-engine", "dt=4e-3") == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines
-    assert all(line.startswith("outside: bouncing_ball:linear reference:compiled ") for line in lines)
+    assert all(line.startswith("outside: bouncing_ball:linear mujoco:matched ") for line in lines)
 
 
 def test_the_frequency_responses_as_json(capsys: pytest.CaptureFixture[str]) -> None:
