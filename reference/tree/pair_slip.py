@@ -141,7 +141,7 @@ def meeting(p: Array, w: Array, o: int, row: int) -> tuple[Vector, Vector, Vecto
 
 @kernels.helper
 def apart(p: Array, w: Array, o: int, x: Vector) -> tuple[Any, Any]:
-    """Return the velocity of the second shape of the pair at p[o:] over the first where they meet, and A_2 - A_1."""
+    """Return velocity and acceleration (at v' = 0) of the second shape of the pair at p[o:] over the first at x."""
     (a, b, c), (d, e, f) = field(p, w, int(p[o + layout.SECOND + layout.NODE].real), x)
     (g, h, i), (j, k, m) = field(p, w, int(p[o + layout.FIRST + layout.NODE].real), x)
     return (a - g, b - h, c - i), (d - j, e - k, f - m)
