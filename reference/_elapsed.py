@@ -14,6 +14,7 @@ class Elapsed:
     def __init__(self) -> None:
         self._used, self._clock = time.thread_time(), time.perf_counter()
 
-    def seconds(self) -> float:
-        """Return it, s."""
-        return max(time.thread_time() - self._used, (time.perf_counter() - self._clock) / WAITING)
+    def exceeds(self, limit: float) -> bool:
+        """Return whether it is more than so many seconds; no thread has computed longer than the clock has run."""
+        clock = time.perf_counter() - self._clock
+        return clock > limit and max(time.thread_time() - self._used, clock / WAITING) > limit

@@ -207,7 +207,7 @@ class CompiledRun:
             self._grow(code)
             interrupts.answer()
             now = time.perf_counter()
-            if elapsed.seconds() > self.options.time_limit:
+            if elapsed.exceeds(self.options.time_limit):
                 return Outcome.TIME_LIMIT
             if now - before > LONG_S and self.callback is None:  # a controller in Python may hang
                 interrupts.hold()

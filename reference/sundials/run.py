@@ -60,7 +60,7 @@ class SundialsRun:
             raise InvalidValue("index is 3; valid: 1, since the system has a kernel velocity: q' is not v.")
         self.system, self.options, self.q0, self.v0 = system, options, q0, v0
         self.samples, (self.inputs_t, self.inputs_u) = options.grid(), options.schedule(system)
-        self.natural = options.samples is None
+        self.natural, self.ones = options.samples is None, np.ones(system.nc)
         if not system.frictional:
             entry(system)  # the kernels are built into the compiled equations before the clock runs
         self.kind: type[Arc] = IdaArc if options.solver == "ida" else CvodeArc
@@ -154,7 +154,7 @@ class SundialsRun:
     def _check_bounds(self, elapsed: Elapsed) -> None:
         if self.scene.steps >= self.options.max_steps:
             raise Ended(Outcome.STEP_LIMIT)
-        if elapsed.seconds() > self.options.time_limit:
+        if elapsed.exceeds(self.options.time_limit):
             raise Ended(Outcome.TIME_LIMIT)
 
     def _settle(self, switched: bool) -> View:
@@ -306,7 +306,8 @@ class SundialsRun:
     def _record(self, lam: Floats) -> None:
         s, e = self.state, self.equations
         gap, energy = e.gaps(s.t, s.q, s.v)[0].copy(), e.energy(s.q, s.v)
-        if not isfinite(gap.sum() + (0.0 if self.system.energy is absent.energy else energy.sum())):
+        known = 0.0 if self.system.energy is absent.energy else energy[0] + energy[1]
+        if not isfinite(gap.dot(self.ones) + known):
             raise Ended(Outcome.NOT_FINITE)
         self.rows.append((s.t, s.q, s.v, gap, lam, energy, [int(m) for m in self.machine.modes], s.z))
 
