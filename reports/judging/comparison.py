@@ -26,6 +26,7 @@ from crossbody.reports.judging.stored import (
     defaults,
     deviations,
     differing,
+    lacking,
     words,
 )
 from crossbody.reports.judging.truth import truth_of
@@ -58,7 +59,7 @@ GROWING = frozenset({
 """Metrics that compare a motion with the truth's, or those of two readers of a file: rounding
 grows as the motion has it."""
 WIDEST = 1e-3
-"""To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion."""
+"""To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion, or a claim."""
 LOOSEST = 1e3
 """So many times the tolerance that limits are for widen them at most: beyond, an error may be as large as a fault's."""
 EXACT = IDENTITIES - GROWING | {"energy_residual", "gap_residual", "rate_residual"}
@@ -265,7 +266,7 @@ class _Judge:
         Those of a case are for its own horizon: each step adds as much.
         """
         found = limit_for(self.limits, metric, self.entry.engine, self.entry.profile)
-        if found is None or metric in EXACT:
+        if found is None or self.exact(metric):
             return found
         grows, longer, looser = self.truth.grows, self.longer, min(self.looser, LOOSEST)
         times, why = longer * looser, found.why
@@ -274,11 +275,26 @@ class _Judge:
             why += f"; the motion makes errors {grows:.2g} times as large as free flight does" if grows > 1.0 else ""
         why += f"; the horizon is {longer:.3g} times the case's own" if longer > 1.0 else ""
         why += f"; {self.looser:.3g} times that tolerance was asked for" if looser > 1.0 else ""
-        return replace(found, value=max(found.value, min(found.value * times, WIDEST)), why=why)
+        claim = self.claims.get(metric)
+        widest = WIDEST * (abs(claim.expected) if claim is not None and claim.expected else 1.0)
+        return replace(found, value=max(found.value, min(found.value * times, widest)), why=why)
+
+    def exact(self, metric: str) -> bool:
+        """Whether neither a tolerance nor a horizon makes a number of a right run larger.
+
+        What holds a run against its own states; multipliers too, where no friction turns with a slip that vanishes.
+        """
+        return metric in EXACT or (metric == "law_residual" and not self.case.rubs)
+
+    def hides(self) -> bool:
+        """Whether the tolerance that was asked for allows a motion errors beyond those that tell a fault from none."""
+        limit = limit_for(self.limits, "position", self.entry.engine, self.entry.profile)
+        stated = 0.0 if limit is None else limit.value
+        return self.looser > LOOSEST or (stated < WIDEST < stated * self.looser)
 
     def told(self, metric: str, word: Word, why: str) -> tuple[Word, str]:
         """What is said of a number: one outside is not judged where a tolerance was asked for that hides any fault."""
-        if word is not Word.OUTSIDE or self.looser <= LOOSEST or metric in EXACT:
+        if word is not Word.OUTSIDE or not self.hides() or self.exact(metric):
             return word, why
         return Word.INFO, "The tolerance that was asked for allows errors as large as that of a fault."
 
@@ -321,7 +337,8 @@ class _Judge:
             return self.row(metric, math.nan, unit, Word.INFO, self.entry.hidden[needs], expected=expected)
         known = "" if limit is None else limit.known
         word = Word.EXPECTED if known and stored is not None and math.isnan(stored) else Word.OUTSIDE
-        if limit is not None and limit.covers_none and claim is None and stored is None:
+        excused = claim is None or metric in lacking(self.case, self.entry)
+        if limit is not None and limit.covers_none and stored is None and excused:
             return self.row(metric, math.nan, unit, Word.INFO, f"{why} Known: {limit.known}.")
         if claim is not None:
             why += f" {claim.expected:g} claimed: {claim.source}."

@@ -68,6 +68,12 @@ def differing(case: Case, entry: Entry) -> frozenset[str]:
     return frozenset() if run is None else frozenset(run["deviations"])
 
 
+def lacking(case: Case, entry: Entry) -> frozenset[str]:
+    """What the stored run of that variant, engine and profile has no number of, whatever its settings."""
+    run = _table().get(case.label, {}).get("runs", {}).get(f"{entry.engine}:{entry.profile}", {"deviations": {}})
+    return frozenset(metric for metric, value in run["deviations"].items() if math.isnan(float(value)))
+
+
 @cache
 def _table() -> dict[str, Any]:
     return json.loads(FILE.read_text(encoding="utf-8")) if FILE.is_file() else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,11 @@ from crossbody.cases.defaults import limits_of
 from crossbody.cases.mechanisms.soft.claims import STEP
 from crossbody.cases.mechanisms.soft.form import fastest
 from crossbody.cases.mechanisms.soft.scene import numbers
+from crossbody.reports.judging import comparison
 from crossbody.reports.judging.comparison import EXACT, GROWING, judged
 from crossbody.reports.judging.reach import tight
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.verdict import Verdict, limit_for
+from crossbody.reports.judging.verdict import Verdict, Word, limit_for
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.runs import choice, jobs
@@ -37,7 +39,8 @@ QUICK = (
     ("red_body", "resolved", 6.0, 0.0, "pinocchio:law"), ("bouncing_ball", "elastic", 6.0, 0.0, "mujoco:matched"),
     ("bouncing_ball", "listing", 1.0, 1e-8, "pinocchio:law"), ("ball_maze", "inside", 1.0, 1e-5, "reference:compiled"),
     ("sliding_block", "flat", 1.0, 1e-8, "reference:compiled"),
-    ("ball_maze", "outside", 1.0, 1e-3, "reference:compiled"),
+    ("ball_maze", "outside", 1.0, 1e-3, "reference:compiled"), ("red_body", "frozen", 1.0, 1e-12, "pinocchio:law"),
+    ("delta_free", "light", 1.0, 1e-6, "pinocchio:law"),
 )  # fmt: skip
 """What was outside once, or rests, and costs little."""
 
@@ -99,8 +102,50 @@ def test_limits_are_as_they_stand_but_for_what_was_asked_for(
         stands = limit_for(limits_of(case), row.metric, row.engine, row.profile)
         if stands is None:
             continue
-        times = 1.0 if row.metric in EXACT else growing if row.metric in GROWING else wider
+        times = 1.0 if row.metric in EXACT | {"law_residual"} else growing if row.metric in GROWING else wider
         assert row.limit == pytest.approx(max(stands.value, min(stands.value * times, 1e-3)), rel=1e-9), row.metric
+
+
+def judge_of(name: str, variant: str, rtol: float) -> comparison._Judge:
+    case = cases.load(name, variant)
+    run = jobs.run_case(cases.load("bouncing_ball", "listing"), choice.picks(["reference:compiled"]), refine=False)
+    entry = replace(run.entries[0], settings={"rtol": rtol})
+    return comparison._Judge(case, entry, run.truth, "run")
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-3])
+@pytest.mark.parametrize(("name", "variant"), [("soft_contact", "axis"), ("delta_tracking", "circle")])
+def test_a_claim_of_a_small_number_is_not_hidden_by_a_loose_tolerance(name: str, variant: str, rtol: float) -> None:
+    """A block that ends 1 % beside its 6.4 mm was within at 1e-6: what limits grow to was in metres, not parts."""
+    judge_ = judge_of(name, variant, rtol)
+    small = [claim for claim in judge_.claims.values() if 0.0 < claim.expected < 0.1 and judge_.limit(claim.metric)]
+    assert small
+    for claim in small:
+        stands = limit_for(judge_.limits, claim.metric, "reference", "compiled")
+        limit = judge_.limit(claim.metric)
+        assert stands is not None
+        assert limit is not None
+        assert limit.value <= max(stands.value, 1e-3 * claim.expected), claim.metric
+
+
+@pytest.mark.parametrize(("name", "stated"), [("bouncing_ball", False), ("delta_free", True)])
+def test_a_tolerance_is_judged_where_its_errors_are_below_a_fault(name: str, stated: bool) -> None:
+    """A hundred times the tolerance takes a fall through a pose of no return to 1e-2, and a ball to 1e-4."""
+    judge_ = judge_of(name, cases.variants(name)[0], 1e-7)
+    assert judge_.told("position", Word.OUTSIDE, "far")[0] == (Word.INFO if stated else Word.OUTSIDE)
+    assert judge_.told("energy_residual", Word.OUTSIDE, "far")[0] == Word.OUTSIDE
+
+
+@pytest.mark.parametrize("name", ["bouncing_ball", "red_body"])
+def test_a_fault_in_the_multipliers_is_outside_at_any_tolerance(name: str) -> None:
+    """They follow from the state at every instant, however coarse that is: 1 % more passed at 1e-3."""
+    case = cases.load(name)
+    found = jobs.run_case(case, choice.picks(["reference:compiled"]), rtol=1e-3, refine=False)
+    (entry,) = found.entries
+    assert entry.run is not None
+    wrong = replace(entry, run=replace(entry.run, lam=1.01 * entry.run.lam))
+    words = {row.metric: row.verdict for row in judged(case, [wrong], found.truth, "")}
+    assert words["law_residual"] == Word.OUTSIDE
 
 
 @pytest.mark.parametrize(
