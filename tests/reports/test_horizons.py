@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -134,6 +135,16 @@ def test_a_tolerance_is_judged_where_its_errors_are_below_a_fault(name: str, sta
     judge_ = judge_of(name, cases.variants(name)[0], 1e-7)
     assert judge_.told("position", Word.OUTSIDE, "far")[0] == (Word.INFO if stated else Word.OUTSIDE)
     assert judge_.told("energy_residual", Word.OUTSIDE, "far")[0] == Word.OUTSIDE
+
+
+def test_an_engine_that_tells_its_tolerance_where_it_is_asked_for_alone_is_judged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its own settings have none: judging a run of a user's own engine threw a KeyError."""
+    judge_ = judge_of("bouncing_ball", "listing", 1e-7)
+    silent = SimpleNamespace(prepare=lambda case, profile: SimpleNamespace(settings={}))
+    monkeypatch.setattr(engines, "load", lambda name: silent)
+    assert comparison.looser(judge_.case, judge_.entry) == pytest.approx(100.0)
 
 
 @pytest.mark.parametrize("name", ["bouncing_ball", "red_body"])
