@@ -62,7 +62,7 @@ WIDEST = 1e-3
 """To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion, or a claim."""
 LOOSEST = 1e3
 """So many times the tolerance that limits are for widen them at most: beyond, an error may be as large as a fault's."""
-EXACT = IDENTITIES - GROWING | {"energy_residual", "gap_residual", "rate_residual"}
+EXACT = IDENTITIES - GROWING | {"energy_residual", "gap_residual"}
 """Metrics of a run against itself: neither a tolerance nor a horizon widens their limits."""
 SUM = 1e-9
 """To which part of it the parts of an error add up to it."""
@@ -266,7 +266,7 @@ class _Judge:
         Those of a case are for its own horizon: each step adds as much.
         """
         found = limit_for(self.limits, metric, self.entry.engine, self.entry.profile)
-        if found is None or self.exact(metric):
+        if found is None or metric in EXACT:
             return found
         grows, longer, looser = self.truth.grows, self.longer, min(self.looser, LOOSEST)
         times, why = longer * looser, found.why
@@ -279,13 +279,6 @@ class _Judge:
         widest = WIDEST * (abs(claim.expected) if claim is not None and claim.expected else 1.0)
         return replace(found, value=max(found.value, min(found.value * times, widest)), why=why)
 
-    def exact(self, metric: str) -> bool:
-        """Whether neither a tolerance nor a horizon makes a number of a right run larger.
-
-        What holds a run against its own states; multipliers too, where no friction turns with a slip that vanishes.
-        """
-        return metric in EXACT or (metric == "law_residual" and not self.case.rubs)
-
     def hides(self) -> bool:
         """Whether the tolerance that was asked for allows a motion errors beyond those that tell a fault from none."""
         limit = limit_for(self.limits, "position", self.entry.engine, self.entry.profile)
@@ -294,7 +287,10 @@ class _Judge:
 
     def told(self, metric: str, word: Word, why: str) -> tuple[Word, str]:
         """What is said of a number: one outside is not judged where a tolerance was asked for that hides any fault."""
-        if word is not Word.OUTSIDE or not self.hides() or self.exact(metric):
+        stands = metric in EXACT or (metric == "law_residual" and not self.case.rubs)  # slips that vanish turn friction
+        if word is Word.OUTSIDE and metric == "rate_residual" and self.looser > 1.0:
+            return Word.INFO, "Its samples lie as far apart as the tolerance that was asked for lets its steps be."
+        if word is not Word.OUTSIDE or stands or not self.hides():
             return word, why
         return Word.INFO, "The tolerance that was asked for allows errors as large as that of a fault."
 
