@@ -345,6 +345,15 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
     return names, laws, unilateral
 
 
+def turning(scene: Scene) -> set[str]:
+    """Return the names of the rows whose gap is an angle: their multipliers are torques."""
+    joints = {joint.name for joint in scene.joints if joint.type in ("hinge", "ball")}
+    bounds = {f"{name} {side}" for name in joints for side in ("low", "high")}
+    loops = {loop.name for loop in scene.loops if loop.type == "joint" and loop.first in joints}
+    dry = {f"{part.name} friction {way}" for part, _ in scene.dry for way in COMPONENTS[3:]}
+    return bounds | loops | dry | {f"{name} friction" for name in joints}
+
+
 def _held_back(law: RowLaw) -> RowLaw:
     """Return the law of rows that friction holds, by that of their contact or joint: a slip decays as fast as a gap."""
     return RowLaw(a0=0.0, a1=law.a1 or math.sqrt(law.a0))
