@@ -124,8 +124,8 @@ def frictional(scene: Scene) -> str | None:
     else:
         return None
     return (
-        f"{what}, which reference:compiled and reference:cvode have, and by laws of their own {theirs}; "
-        "without=friction leaves that of a file out of every engine."
+        f"{what}. reference:compiled and reference:cvode follow its law; {theirs} follow laws of their own. "
+        "For a file, without=friction removes it in every engine."
     )
 
 
