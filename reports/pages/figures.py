@@ -87,13 +87,24 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
                 error = apart(trace.run.q[:, k], trace.truth.q[:, k], floors[names[k][1]])
                 sheet.line(trace, i, 2 * place + 1, error)
     scales = traces[0].about.get("scales", ())
+    least = min(limits.get("position", {}), default=0.0)
     turns = {at + i for at in traces[0].quaternions for i in range(4)}  # judged by their angle
     for place, k in enumerate(shown):
         if k < len(scales) and k not in turns:
             for limit, name in limits.get("position", {}).items():
                 sheet.limit(2 * place + 1, limit * scales[k], name)
+            _show_still(sheet, 2 * place, np.concatenate([trace.run.q[:, k] for trace in traces]), least * scales[k])
     sheet.logarithmic(*range(1, len(rows), 2))
     return sheet.done()
+
+
+def _show_still(sheet: Sheet, row: int, values: Floats, limit: float) -> None:
+    """Draw a coordinate that moves by less than its limit as one at rest: what it does is rounding."""
+    values = values[np.isfinite(values)]
+    if len(values) and (high := values.max()) - (low := values.min()) < limit:
+        middle = 0.5 * (low + high)
+        reach = max(limit, 0.5 * abs(middle))
+        sheet.clip(row, middle - reach, middle + reach)
 
 
 def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:

@@ -70,7 +70,7 @@ def judged(metrics: pd.DataFrame) -> str:
         return "Nothing is judged, since no limit was given (for example --limit fit=90)."
     off = rows[rows["verdict"] == "outside"]
     those = [
-        f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g}{unit_text(row.unit)}"
+        f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g}{unit_text(str(row.unit))}"
         for row in off.itertuples()
     ]
     return f"{len(rows) - len(off)} of {len(rows)} limits are met." + (

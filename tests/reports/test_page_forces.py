@@ -15,13 +15,15 @@ from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import load as load_engine
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.figures import force, note, penetration, suits
+from crossbody.reports.pages.figures import force, motion, note, penetration, suits
 from crossbody.reports.pages.friction import hysteresis
 from crossbody.reports.runs import study
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.runs.jobs import run_case
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.store import load as load_trace
+
+LIMITS = {"position": {1e-6: "limit", 1e-3: "limit of fake:p"}}
 
 
 @pytest.fixture(scope="module")
@@ -112,3 +114,13 @@ def test_a_bound_of_an_angle_pushes_with_a_torque(tmp_path: Path) -> None:
 
 def axis_titles(drawn: Figure) -> list[str]:
     return [axis["title"]["text"] for key, axis in drawn["layout"].items() if key.startswith("yaxis")]
+
+
+def test_a_coordinate_that_only_rounding_moves_is_drawn_at_rest(run: Trajectory) -> None:
+    def drawn(size: float) -> dict[str, object]:
+        still = replace(run, q=size * np.sin(run.t)[:, None])
+        found = trace(still)
+        return motion([replace(found, about=found.about | {"scales": [1.0]})], limits=LIMITS)["layout"]["yaxis"]
+
+    assert drawn(1e-15)["range"] == pytest.approx([-1e-6, 1e-6], rel=1e-3)
+    assert "range" not in drawn(1e-2)
