@@ -43,8 +43,8 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     case = load("bouncing_ball", "linear")
     truth = truth_of(case)
     runs = [
-        replace(truth.trajectory, q=truth.trajectory.q * (1 + error * np.sin(k * truth.trajectory.t))[:, None])
-        for k, error in ((1, 1e-3), (2, 1e-13))
+        replace(truth.trajectory, q=truth.trajectory.q * (1 + 1e-3 * np.sin(k * truth.trajectory.t))[:, None])
+        for k in (1, 2)
     ]
     entries = tuple(Entry(engine="fake", profile=f"p{k}", run=run) for k, run in enumerate(runs))
     results = [CaseResult(case=case, truth=truth, entries=entries)]
