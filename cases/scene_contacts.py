@@ -124,8 +124,8 @@ def frictional(scene: Scene) -> str | None:
     else:
         return None
     return (
-        f"{what}, which reference:compiled and reference:cvode have, and by laws of their own {theirs}; "
-        "without=friction leaves that of a file out of every engine."
+        f"{what}. reference:compiled and reference:cvode follow its law; {theirs} follow laws of their own. "
+        "For a file, without=friction removes it in every engine."
     )
 
 
@@ -343,6 +343,15 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
         laws += [_held_back(part.law)] * width
         unilateral += [True] * width
     return names, laws, unilateral
+
+
+def turning(scene: Scene) -> set[str]:
+    """Return the names of the rows whose gap is an angle: their multipliers are torques."""
+    joints = {joint.name for joint in scene.joints if joint.type in ("hinge", "ball")}
+    bounds = {f"{name} {side}" for name in joints for side in ("low", "high")}
+    loops = {loop.name for loop in scene.loops if loop.type == "joint" and loop.first in joints}
+    dry = {f"{part.name} friction {way}" for part, _ in scene.dry for way in COMPONENTS[3:]}
+    return bounds | loops | dry | {f"{name} friction" for name in joints}
 
 
 def _held_back(law: RowLaw) -> RowLaw:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 from crossbody.reference import code_store
@@ -61,6 +62,21 @@ def test_sources_cite_what_a_reader_has() -> None:
 def test_every_command_is_in_the_reference() -> None:
     named = set(re.findall(r"^\| `crossbody (\w+)", (DOCS / "reference/commands.md").read_text(), re.MULTILINE))
     assert named == set(cli.commands)
+
+
+OF_OTHERS = {"--help", "--junitxml", "--protocol", "--tls-ca-file"}
+"""Options of click, pytest and dask."""
+
+
+def options(command: click.Command) -> set[str]:
+    below = command.commands.values() if isinstance(command, click.Group) else ()
+    return {name for one in command.params for name in one.opts}.union(*map(options, below))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_option_that_a_page_names_is_one(page: str) -> None:
+    named = set(re.findall(r"(?<![\w-])--(?!crossbody)[a-z][a-z-]+", (DOCS / page).read_text(encoding="utf-8")))
+    assert named <= options(cli) | OF_OTHERS
 
 
 def test_every_how_to_page_has_its_figure_and_the_command_that_draws_it() -> None:

@@ -16,7 +16,7 @@ from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import voice
 from crossbody.reports.commands.shared import identity, where
 from crossbody.reports.figures.section import records
-from crossbody.reports.judging.verdict import Word, exit_code
+from crossbody.reports.judging.verdict import Word, exit_code, unit_text
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison, kept
 from crossbody.reports.replay import comparison as replay
@@ -205,7 +205,7 @@ def _say_outside(rows: pd.DataFrame) -> None:
     for row in rows[rows["verdict"] == Word.OUTSIDE].to_dict(orient="records"):
         best, most = row["expected"], row["limit"]
         bound = f"valid: at least {best - most:.6g}" if best else f"limit {most:.4g}"
-        who, value = f"{row['engine']}:{row['profile']}", f"{row['value']:.4g} {row['unit']}"
+        who, value = f"{row['engine']}:{row['profile']}", f"{row['value']:.4g}{unit_text(row['unit'])}"
         print(f"outside: {who} {row['metric']} is {value}, {bound}. {row['why']}")
 
 
@@ -213,9 +213,10 @@ def _say(found: Comparison, metrics: pd.DataFrame) -> None:
     print(f"{replay.tier(found.log)}: {found.log.provenance.file} on {found.model}, {len(found.windows)} windows")
     for finding in found.log.findings:
         print(f"note: {finding.channel}, row {finding.row}: {finding.text}")
-    named = (metrics["metric"] + " " + metrics["channel"]).str.strip() + " [" + metrics["unit"] + "]"
-    wide = metrics.assign(metric=named).pivot(index="metric", columns="who", values="value").loc[named.unique()]
-    print(wide.to_string(float_format=lambda x: f"{x:.5g}"))
+    units = metrics["unit"].map(lambda unit: unit_text(unit, " [{}]"))
+    name = (metrics["metric"] + " " + metrics["channel"]).str.strip() + units
+    wide = metrics.assign(metric=name).pivot(index="metric", columns="who", values="value").loc[name.unique()]
+    print(wide.rename_axis(index=None, columns=None).to_string(float_format=lambda x: f"{x:.5g}"))
     for (engine, profile), why in found.skipped.items():
         print(f"skipped {engine}:{profile}: {why}")
 

@@ -14,7 +14,7 @@ import click
 from crossbody.reports import voice
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, runs_of, sentence
-from crossbody.reports.judging.verdict import Regression, Row, Word
+from crossbody.reports.judging.verdict import Regression, Row, Word, unit_text
 from crossbody.reports.pages import html
 from crossbody.reports.pages.results import Times
 
@@ -114,7 +114,9 @@ def _number(value: float | None) -> str:
 
 
 def _wrong(run: EngineRun, row: Row) -> str:
-    number = f" {row['value']:.4g}{_unit(row)}, limit {row['limit']:.4g}" if row["verdict"] == Word.OUTSIDE else ""
+    number = ""
+    if row["verdict"] == Word.OUTSIDE:
+        number = f" {row['value']:.4g}{unit_text(row['unit'])}, limit {row['limit']:.4g}"
     place = f" ({row['where']})" if row.get("where") else ""
     return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}{place}. {row['why']}"
 
@@ -123,12 +125,8 @@ def _lost(run: EngineRun, row: Row) -> str:
     if math.isnan(row["band"]):
         return f"worse than the stored run: {run.label} {row['metric']}. {row['why']}"
     expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
-    value = f"{abs(row['value'] - expected):.4g}{_unit(row)} from what is claimed, band {row['band']:.3g}"
+    value = f"{abs(row['value'] - expected):.4g}{unit_text(row['unit'])} from what is claimed, band {row['band']:.3g}"
     return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"
-
-
-def _unit(row: Row) -> str:
-    return "" if row["unit"] in ("1", "") else f" {row['unit']}"
 
 
 def _absent(runs: Sequence[EngineRun]) -> list[str]:

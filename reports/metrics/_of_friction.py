@@ -27,7 +27,7 @@ def cone_violation(run: Trajectory, case: Case) -> float | None:
 
 
 def creep_speed(run: Trajectory, case: Case) -> float | None:
-    """Largest slip at the end of contacts that hold: nought where friction holds, whatever the bound on its force."""
+    """Largest slip at the end of contacts that hold: zero where friction holds, whatever the bound on its force."""
     if (found := rubbing(run, case)) is None:
         return None
     held = run.mode[-1, found.rows] == Mode.STICK
@@ -52,7 +52,7 @@ def friction_impulse(run: Trajectory, case: Case) -> Floats | None:
 
 
 def friction_power(run: Trajectory, case: Case) -> float | None:
-    """Largest power that friction of a pair of shapes gives: nought where it is against the slip."""
+    """Largest power that friction of a pair of shapes gives: zero where it is against the slip."""
     if (found := rubbing(run, case)) is None:
         return None
     return float(np.max(found.of_pairs(np.sum(found.force * found.slip, axis=-1)), initial=0.0))

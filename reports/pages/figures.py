@@ -24,6 +24,8 @@ FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
 BEYOND = 1.5  # times the truth's largest force up to which forces are drawn
+NAMED = 6
+"""Contacts without a force that are named; a robot has hundreds."""
 ROUNDING = 1e-17  # depth below which there is none, m
 
 
@@ -85,13 +87,24 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
                 error = apart(trace.run.q[:, k], trace.truth.q[:, k], floors[names[k][1]])
                 sheet.line(trace, i, 2 * place + 1, error)
     scales = traces[0].about.get("scales", ())
+    least = min(limits.get("position", {}), default=0.0)
     turns = {at + i for at in traces[0].quaternions for i in range(4)}  # judged by their angle
     for place, k in enumerate(shown):
         if k < len(scales) and k not in turns:
             for limit, name in limits.get("position", {}).items():
                 sheet.limit(2 * place + 1, limit * scales[k], name)
+            _show_still(sheet, 2 * place, np.concatenate([trace.run.q[:, k] for trace in traces]), least * scales[k])
     sheet.logarithmic(*range(1, len(rows), 2))
     return sheet.done()
+
+
+def _show_still(sheet: Sheet, row: int, values: Floats, limit: float) -> None:
+    """Draw a coordinate that moves by less than its limit as one at rest: what it does is rounding."""
+    values = values[np.isfinite(values)]
+    if len(values) and (high := values.max()) - (low := values.min()) < limit:
+        middle = 0.5 * (low + high)
+        reach = max(limit, 0.5 * abs(middle))
+        sheet.clip(row, middle - reach, middle + reach)
 
 
 def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
@@ -99,8 +112,8 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     contacts = traces[0].about["contacts"]
     bearing = carrying(traces)
     shown = [bearing[k] for k in drawn(len(bearing))]
-    each = ("lam {}\n[N]", "impulse\n[N s]", "|error|\n[N s]")
-    rows = [text.format(contacts[k]) for k in shown for text in each]
+    each = ("lam {}\n[{}]", "impulse\n[{1} s]", "|error|\n[{1} s]")
+    rows = [text.format(contacts[k], force_unit(traces, k)) for k in shown for text in each]
     sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference from the truth|", points, group=3)
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
     floor = floor_of(summed[0])
@@ -116,11 +129,16 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
         ends, far = robust(traces, k)
         if ends is not None:
             sheet.clip(3 * place, *ends)
-            sheet.say(far)
+            sheet.say(f"{contacts[k]}, {far}")
         for limit, name in limits.get("lam_impulse_path", {}).items():
             sheet.limit(3 * place + 2, limit * float(np.nanmax(np.abs(summed[0]), initial=0.0)), name)
     sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
+
+
+def force_unit(traces: Sequence[Trace], k: int) -> str:
+    """Unit of a contact's multiplier: a torque where its gap is an angle."""
+    return "N m" if traces[0].about["contacts"][k] in traces[0].about.get("turning", ()) else "N"
 
 
 def carrying(traces: Sequence[Trace]) -> list[int]:
@@ -139,7 +157,7 @@ def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None,
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
     if not far or reach == 0.0:
         return None, ""
-    told = ", ".join(f"{who} reaches {size:.2g} N" for who, size in far.items())
+    told = ", ".join(f"{who} reaches {size:.2g} {force_unit(traces, k)}" for who, size in far.items())
     return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), told
 
 
@@ -168,7 +186,11 @@ def penetration(traces: Sequence[Trace], points: int = POINTS, limits: Limits = 
     contacts = traces[0].about["contacts"]
     shown = drawn(len(contacts))
     always = [bool((traces[0].run.mode[:, k] == Mode.BILATERAL).all()) for k in shown]
-    rows = [f"{'|gap|' if on else 'depth'} {contacts[k]}\n[m]" for k, on in zip(shown, always, strict=True)]
+    turn = traces[0].about.get("turning", ())
+    rows = [
+        f"{'|gap|' if on else 'depth'} {contacts[k]}\n[{'rad' if contacts[k] in turn else 'm'}]"
+        for k, on in zip(shown, always, strict=True)
+    ]
     sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points, group=len(rows))
     for row, (k, on) in enumerate(zip(shown, always, strict=True)):
         for i, trace in enumerate(traces):
@@ -210,7 +232,8 @@ def note(name: str, traces: Sequence[Trace]) -> str:
     else:
         idle = []
     some = f"{MOST_SIGNALS} of {count} {listed} are drawn; all are stored." if count > MOST_SIGNALS else ""
-    some += f" Without a force in every run: {', '.join(idle)}." if idle else ""
+    more = f" and {len(idle) - NAMED} more" if len(idle) > NAMED else ""
+    some += f" Without a force in every run: {', '.join(idle[:NAMED])}{more}." if idle else ""
     return f"{NOTES.get(name, '')} {some}".strip()
 
 

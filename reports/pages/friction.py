@@ -13,7 +13,7 @@ from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import LEVEL, coded, label, plain, style
-from crossbody.reports.pages.figures import robust
+from crossbody.reports.pages.figures import force_unit, robust
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 from crossbody.reports.scenes.scene import slip
@@ -45,10 +45,12 @@ def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     name = traces[0].about["contacts"][k]
     ends, far = robust(traces, k)
     title = f"Force over depth, contact {plain(name)}{far and f'. Off scale: {far}'}"
+    unit = force_unit(traces, k)
     layout = {
         "title": {"text": title}, "height": 420, "showlegend": False,
-        "xaxis": {"title": {"text": "depth [m]"}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": "lam [N]"}, "exponentformat": "power"} | ({"range": list(ends)} if ends else {}),
+        "xaxis": {"title": {"text": f"depth [{'m' if unit == 'N' else 'rad'}]"}, "exponentformat": "power"},
+        "yaxis": {"title": {"text": f"lam [{unit}]"}, "exponentformat": "power"}
+        | ({"range": list(ends)} if ends else {}),
     }  # fmt: skip
     plots = (Plot(name="plot-hysteresis", figure={"data": lines, "layout": layout}),)
     return [Section(name="hysteresis", title="Force over depth", text=OVER_DEPTH, plots=plots)] if lines else []

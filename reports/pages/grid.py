@@ -10,7 +10,7 @@ from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import share
-from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.judging.verdict import Row, Word, unit_text
 from crossbody.reports.pages.html import bounded, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
@@ -150,7 +150,7 @@ def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Se
         far[row["metric"]] = max(far.get(row["metric"], 0.0), share(row))
     far |= {name: far.get("position", 0.0) for name in SHARES}
     judged += [row for row in rows if judged and row["metric"] in SHARES]
-    units = {row["metric"]: f"[{row['unit']}]" if row["unit"] not in ("", "1") else "" for row in judged or rows}
+    units = {row["metric"]: unit_text(row["unit"], "[{}]") for row in judged or rows}
     first = [name for name in KEY if name in units]
     order = sorted(units, key=lambda name: (-far.get(name, 0.0), first.index(name) if name in first else len(first)))
     values = {who: {row["metric"]: row for row in mine[who]} for who in engines}
@@ -166,8 +166,8 @@ def _value(row: Row | None, page: str) -> Cell:
     limit = row["limit"]
     allowed = f", limit {number(limit)}" if limit is not None and limit == limit else ""
     below, value = bounded(row["value"], row["known"])
-    unit = "" if row["unit"] == "1" else f" {row['unit']}"
     place = f" ({row['where']})" if row.get("where") else ""
+    unit = unit_text(row["unit"])
     title = f"{row['who']}, {row['metric']}: {below}{number(value)}{unit}{allowed}{place}. {row['why']}"
     anchor = f"{row['who']}~{row['metric']}"
     text = below + short(value)

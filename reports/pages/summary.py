@@ -110,8 +110,9 @@ def deviations(rows: Iterable[Row]) -> list[Section]:
 
 def _line(who: str, why: str, rows: list[Row]) -> dict[str, Any]:
     farthest = max((row for row in rows if math.isfinite(share(row))), key=share, default=rows[0])
+    text = why[:1].upper() + why[1:]
     return {
-        "who": who, "why": why, "metrics": ", ".join(dict.fromkeys(row["metric"] for row in rows)),
+        "who": who, "why": text, "metrics": ", ".join(dict.fromkeys(row["metric"] for row in rows)),
         "cases": len({row["label"] for row in rows}), "rows": len(rows), "most": share(farthest),
         "where": f"{farthest['label']}, {farthest['metric']}",
     }  # fmt: skip

@@ -96,15 +96,15 @@ def together(rows: pd.DataFrame) -> Figure:
         "type": "heatmap", "x": labels, "y": labels, "zmin": -1.0, "zmax": 1.0, "colorscale": SIGNED,
         "xgap": 1, "ygap": 1, "z": [[None if np.isnan(x) else x for x in row] for row in wide.tolist()],
         "text": [["" if np.isnan(x) else f"{x:+.2f}" for x in row] for row in wide],
-        "texttemplate": "%{text}", "colorbar": {"title": {"text": "correlation [1]"}},
+        "texttemplate": "%{text}", "colorbar": {"title": {"text": "correlation"}},
         "hovertemplate": "%{x} and %{y}: %{z:.4f}<extra></extra>",
     }  # fmt: skip
     return {
         "data": [heat],
         "layout": {
             "title": {"text": "Correlation of the estimates"}, "height": 180 + 60 * len(names),
-            "xaxis": {"title": {"text": "parameter [-]"}, "type": "category", "constrain": "domain"},
-            "yaxis": {"title": {"text": "parameter [-]"}, "type": "category", "autorange": "reversed",
+            "xaxis": {"type": "category", "constrain": "domain"},
+            "yaxis": {"type": "category", "autorange": "reversed",
                       "automargin": True, "scaleanchor": "x", "constrain": "domain"},
         },
     }  # fmt: skip

@@ -16,7 +16,7 @@ from pyarrow.csv import ConvertOptions, ParseOptions, read_csv
 
 from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.scene_contacts import contacts
+from crossbody.cases.scene_contacts import contacts, turning
 from crossbody.cases.scene_plain import plain
 from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.verdict import COLUMNS, Row
@@ -160,7 +160,7 @@ def _about(case: Case, engine: str, profile: str) -> dict[str, Any]:
         return found
     met = tuple(contact.pair for contact in contacts(case.scene))
     drawn = case.scene.replace(pairs=met, actuators=(), pushes=())  # what a picture of it needs
-    return found | {"scene": plain(drawn)}
+    return found | {"scene": plain(drawn), "turning": sorted(turning(case.scene).intersection(case.contacts))}
 
 
 def traces(result: CaseResult) -> list[Trace]:

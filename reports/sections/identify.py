@@ -41,6 +41,8 @@ def sections(out: Path) -> tuple[Section, ...]:
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
     estimates["half"] = (estimates["high"] - estimates["low"]) / 2.0
     told = read_json(out / "identify.json")["provenance"]["fit"]
+    text = _told(estimates, held, told)
+    estimates["identifiable"] = estimates["identifiable"].map({True: "yes", False: "no"})
     tables = (
         Table(title="Estimates", columns=ESTIMATES, rows=records(_only(estimates, ESTIMATES)), file="identify.csv"),
         Table(title="Errors before and after", columns=HELD, rows=records(_only(held, HELD)), file="held_out.csv"),
@@ -55,7 +57,7 @@ def sections(out: Path) -> tuple[Section, ...]:
         plots.append(Plot(name="identify-profile", figure=figure.profile(drawn["profile"], estimates)))
     if len(estimates) > 1 and len(drawn.get("correlation", ())):
         plots.append(Plot(name="identify-correlation", figure=figure.together(drawn["correlation"])))
-    first = Section(name="identify", title="Identified parameters", text=_told(estimates, held, told), tables=tables)
+    first = Section(name="identify", title="Identified parameters", text=text, tables=tables)
     if not plots:
         return (first,)
     return (first, Section(name="identify-plots", title="How well they are determined", text=PROFILE, plots=plots))

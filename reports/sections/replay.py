@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns, records
+from crossbody.reports.judging.verdict import unit_text
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Replay"
@@ -38,6 +39,7 @@ def sections(out: Path) -> tuple[Section, ...]:
         for name in ("replay", "findings", "residuals", "correlations")
     )
     metrics = metrics.reindex(columns=[column.key for column in METRICS])  # an earlier run judged nothing
+    metrics["unit"] = metrics["unit"].map(lambda unit: unit_text(unit, "{}"))
     told = read_json(out / "replay.json")["provenance"]
     about, held = told["log"], told.get("fit", {}).get("held", ())
     noise = {str(row["channel"]): float(row["value"]) for row in records(metrics) if row["metric"] == "noise"}
@@ -67,9 +69,10 @@ def judged(metrics: pd.DataFrame) -> str:
     if rows.empty:
         return "Nothing is judged, since no limit was given (for example --limit fit=90)."
     off = rows[rows["verdict"] == "outside"]
-    named = [
-        f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g} {row.unit}" for row in off.itertuples()
+    those = [
+        f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g}{unit_text(str(row.unit))}"
+        for row in off.itertuples()
     ]
     return f"{len(rows) - len(off)} of {len(rows)} limits are met." + (
-        f" Outside: {', '.join(named)}." if named else ""
+        f" Outside: {', '.join(those)}." if those else ""
     )

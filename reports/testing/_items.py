@@ -11,7 +11,7 @@ import pytest
 from crossbody.cases import Case, installed
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.loading import OF_USERS
-from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.judging.verdict import Verdict, Word, unit_text
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.testing import plugin
 from crossbody.reports.testing._bench import Bench
@@ -123,5 +123,4 @@ class OneLimit(Judged):
 def _number(row: Verdict) -> str:
     wanted = "" if math.isnan(row.expected) else f" where {row.expected:.6g} is expected"
     limit = "" if math.isnan(row.limit) else f", limit {row.limit:.3g}"
-    unit = f" {row.unit}" if row.unit not in ("", "1") else ""
-    return f"{row.metric} is {row.value:.6g}{unit}{wanted}{limit}"
+    return f"{row.metric} is {row.value:.6g}{unit_text(row.unit)}{wanted}{limit}"

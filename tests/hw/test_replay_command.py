@@ -95,11 +95,17 @@ def test_a_synthetic_log_is_called_so_everywhere(tmp_path: Path, capsys: pytest.
     hw.store(hw.delta_log(hw.delta_plant(t_end=0.6)), path)
     asked = ("replay", path, "-m", "delta", "-e", "reference", "--closed-loop", "--delay", "4e-4", "--out", out)
     assert code(*asked) == 0
-    assert "SYNTHETIC, no measurement" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "SYNTHETIC, no measurement" in printed
+    assert "[rad]" in printed
+    assert "[1]" not in printed, "a count or a ratio has no unit"
     rows = json.loads((out / "verdicts.json").read_text(encoding="utf-8"))["rows"]
     assert {row["tier"] for row in rows} == {"SYNTHETIC, no measurement"}
     assert all("synthetic" in row["variant"] for row in rows)
-    assert "SYNTHETIC" in (out / "index.html").read_text(encoding="utf-8")
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "SYNTHETIC" in page
+    assert '<td class="text">rad</td>' in page
+    assert '<td class="text">1</td>' not in page
 
 
 @needs_pendulum

@@ -331,6 +331,15 @@ def test_every_page_is_quiet_fits_and_has_no_violation(whole: Path, browser: chr
     assert {where: text for where, text in told.items() if text} == {}
 
 
+CROSSED = """[...document.querySelectorAll('.plot')].flatMap((plot) => {
+    const boxes = (kind) => [...plot.querySelectorAll(kind)].map((each) => each.getBoundingClientRect());
+    const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+    const ticks = boxes('.xtick text');
+    return boxes('[class*="g-x"] text').some((title) => ticks.some((tick) => meet(title, tick))) ? [plot.id] : [];
+})"""
+"""Plots where the title of an axis lies over the labels of its ticks."""
+
+
 def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[str]:
     """What a page does wrong; axe is asked at one width, where it is installed: it sees the same at both."""
     browser.open(page, width, theme)
@@ -338,6 +347,7 @@ def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[
     found = browser.complaints()
     if not browser.js("document.documentElement.scrollWidth <= innerWidth"):
         found.append("wider than the window")
+    found += [f"{name}: title over ticks" for name in browser.js(CROSSED)]
     if AXE is None or AXE.origin is None or width != 1400:
         return found
     browser.js(f"{Path(AXE.origin).with_name('axe.min.js').read_text(encoding='utf-8')}; 0")

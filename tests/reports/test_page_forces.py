@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import base64
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from crossbody.cases import Trajectory, load
+from crossbody.cases import Trajectory, from_scene, load
 from crossbody.cases.arrays import Floats
+from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import load as load_engine
+from crossbody.reports.figures.section import Figure
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.figures import force, note, suits
+from crossbody.reports.pages.figures import force, motion, note, penetration, suits
 from crossbody.reports.pages.friction import hysteresis
+from crossbody.reports.runs import study
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.runs.jobs import run_case
 from crossbody.reports.runs.store import Trace
+from crossbody.reports.runs.store import load as load_trace
+
+LIMITS = {"position": {1e-6: "limit", 1e-3: "limit of fake:p"}}
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +65,7 @@ def test_a_row_that_is_always_on_has_no_loop() -> None:
 def test_a_force_beyond_the_plot_is_named(run: Trajectory) -> None:
     drawn = force([trace(run), trace(replace(run, lam=100.0 * run.lam), "wild")])
     top = float(np.nanmax(run.lam))
-    assert f"Off scale: wild:p reaches {100.0 * top:.2g} N" in drawn["layout"]["title"]["text"]
+    assert f"Off scale: floor, wild:p reaches {100.0 * top:.2g} N" in drawn["layout"]["title"]["text"]
     assert top < drawn["layout"]["yaxis"]["range"][1] < 2.0 * top
     calm = force([trace(run), trace(replace(run, lam=1.2 * run.lam), "calm")])
     assert "Off scale" not in calm["layout"]["title"]["text"]
@@ -80,3 +87,40 @@ def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> Non
     assert [text.partition("<br>")[0] for text in titles] == ["lam floor", "impulse"]
     assert note("force", [bears]).endswith("Without a force in every run: wall.")
     assert (suits("force", [bears]), suits("force", [idles])) == (True, False)
+
+
+def test_of_many_rows_that_carry_nothing_a_few_are_named(run: Trajectory) -> None:
+    """A robot has hundreds; their names would fill the page."""
+    names = ["floor", *(f"pair {k}" for k in range(600))]
+    rows = {name: np.repeat(getattr(run, name), 601, axis=1) for name in ("gap", "mode")}
+    found = trace(replace(run, lam=np.c_[run.lam, np.zeros((len(run.t), 600))], ledger=None, **rows))
+    told = note("force", [replace(found, about=found.about | {"contacts": names})])
+    assert told.endswith("Without a force in every run: pair 0, pair 1, pair 2, pair 3, pair 4, pair 5 and 594 more.")
+
+
+def test_a_bound_of_an_angle_pushes_with_a_torque(tmp_path: Path) -> None:
+    rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, 0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
+    hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0), range=(-2.0, 0.3))
+    case = from_scene(Scene(bodies=(rod,), joints=(hinge,)), q0=[0.2], t_end=1.0)
+    result = run_case(case, [Pick(engine="reference", profile="compiled")], refine=False)
+    study.write(tmp_path, [result], study.judge([result], {case.label: ""}), {"command": "", "time": ""})
+    traces = [load_trace(path) for path in sorted((tmp_path / "traces").rglob("*.parquet"))]
+    assert "lam hinge high<br>[N m]" in axis_titles(force(traces))
+    assert "impulse<br>[N m s]" in axis_titles(force(traces))
+    assert "depth hinge high<br>[rad]" in axis_titles(penetration(traces))
+    (section,) = hysteresis(traces)
+    assert axis_titles(section.plots[0].figure) == ["lam [N m]"]
+
+
+def axis_titles(drawn: Figure) -> list[str]:
+    return [axis["title"]["text"] for key, axis in drawn["layout"].items() if key.startswith("yaxis")]
+
+
+def test_a_coordinate_that_only_rounding_moves_is_drawn_at_rest(run: Trajectory) -> None:
+    def drawn(size: float) -> dict[str, object]:
+        still = replace(run, q=size * np.sin(run.t)[:, None])
+        found = trace(still)
+        return motion([replace(found, about=found.about | {"scales": [1.0]})], limits=LIMITS)["layout"]["yaxis"]
+
+    assert drawn(1e-15)["range"] == pytest.approx([-1e-6, 1e-6], rel=1e-3)
+    assert "range" not in drawn(1e-2)

@@ -95,7 +95,7 @@ def mixed(pull: float, step: float = STEP) -> float:
 
 
 CREEPS = (
-    "it creeps as the engine's own parameters say: it has friction as a function of the slip, and a force needs one"
+    "it creeps as its own parameters predict: its friction is a function of the slip, so no force acts without slip"
 )
 NEAR = 0.05  # part of a predicted creep by which the measured one may be off
 NOTHING: Mapping[tuple[str, str], float] = MappingProxyType({})

@@ -224,7 +224,13 @@
         const value = nice(60 / pixels);
         trace([[x, line], [x + value * pixels, line]]);
         g.stroke();
-        g.fillText(`${shortNumber(value)} ${unit}`, x + value * pixels + 6, line + 4);
+        const label = [`${shortNumber(value)} ${unit}`, x + value * pixels + 6, line + 4];
+        g.strokeStyle = colour("--paper"); // what is drawn behind must not cross the text out
+        g.lineWidth = 5;
+        g.strokeText(...label);
+        g.strokeStyle = colour("--soft");
+        g.lineWidth = 2;
+        g.fillText(...label);
         line -= 16;
       };
       measure(scale, "m");
