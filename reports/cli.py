@@ -58,7 +58,7 @@ def cli() -> None:
 
 
 @cli.command("list")
-@click.argument("name", metavar="[CASE or ENGINE]", required=False)
+@click.argument("name", metavar="[CASE or ENGINE]", required=False, shell_complete=options.names_of("cases", "engines"))
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
 def list_(name: str | None, plain: bool) -> None:
     """List all names, or the details of CASE or ENGINE.
@@ -164,7 +164,7 @@ def stability(**asked: Any) -> int:
 
 
 @cli.command()
-@click.argument("names", metavar="[SUITE]...", nargs=-1)
+@click.argument("names", metavar="[SUITE]...", nargs=-1, shell_complete=options.names_of("reports.suites"))
 @options.wanted
 @click.option("--runs", type=int, metavar="N", help="Number of runs of the first engine, over all suites.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all draws.")
@@ -195,7 +195,7 @@ def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) ->
 
 
 @cli.command()
-@click.argument("name", metavar="CASE")
+@click.argument("name", metavar="CASE", shell_complete=options.names_of("cases"))
 @options.parameters
 @options.out()
 @speaks
@@ -208,8 +208,11 @@ def bode(**asked: Any) -> int:
 
 
 @cli.command()
-@click.argument("name", metavar="CASE")
-@click.option("--variant", "--key", metavar="V", help="Variant of the case; the first if not given.")
+@click.argument("name", metavar="CASE", shell_complete=options.names_of("cases"))
+@click.option(
+    "--variant", "--key", metavar="V", help="Variant of the case; the first if not given.",
+    shell_complete=options.variants_of,
+)  # fmt: skip
 @options.parameters
 @click.option("--at", metavar="K=V", multiple=True, help="Position of the flange (x, y, z), m; repeatable.")
 @click.option("--bode", is_flag=True, help="Add frequency responses.")
@@ -402,6 +405,8 @@ def main(arguments: list[str] | None = None) -> None:
 
     From a shell (no arguments given here) the command runs in a child that this process watches.
     """
+    if arguments is None and "_CROSSBODY_COMPLETE" in os.environ:  # a shell asks what may stand there
+        cli.main(prog_name="crossbody")
     if arguments is None and hasattr(os, "fork"):
         from crossbody.reports.runs.watch import watched
 

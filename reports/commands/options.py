@@ -7,10 +7,12 @@ import shlex
 import sys
 from collections.abc import Callable
 from functools import wraps
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
 PATH = click.Path(path_type=Path)
@@ -26,6 +28,25 @@ def together(command: _Work, *options: Any) -> _Work:
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def names_of(*modules: str) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
+    """Return what a shell completes to names that modules of crossbody tell (`names`), or to files where none fits."""
+
+    def fitting(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+        known = [name for module in modules for name in import_module(f"crossbody.{module}").names()]
+        found = [CompletionItem(name) for name in known if name.startswith(begun)]
+        return found or [CompletionItem(begun, type="file")]
+
+    return fitting
+
+
+def variants_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Return what a shell completes to variants of the cases that stand before it."""
+    from crossbody import cases
+
+    given = [word for word in context.args if word in cases.names()]
+    return [CompletionItem(variant) for name in given for variant in cases.variants(name) if variant.startswith(begun)]
 
 
 class _Positive(click.FloatRange):
@@ -57,12 +78,25 @@ def out(folder: str = "out") -> Callable[[_Work], _Work]:
     )
 
 
-wanted = click.option("--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.")
+wanted = click.option(
+    "--engine", "-e", "wanted", metavar="E[:PROFILE]", multiple=True, help="Engine; repeatable.",
+    shell_complete=names_of("engines"),
+)  # fmt: skip
 readers = click.option(
-    "--engine", "-e", "engines", metavar="E", multiple=True, help="Engine; repeatable; all if not given."
+    "--engine",
+    "-e",
+    "engines",
+    metavar="E",
+    multiple=True,
+    help="Engine; repeatable; all if not given.",
+    shell_complete=names_of("engines"),
 )
 variant = click.option(
-    "--variant", "--key", metavar="V", help="Variant of the case, or keyframe of a robot file; all if not given."
+    "--variant",
+    "--key",
+    metavar="V",
+    help="Variant of the case, or keyframe of a robot file; all if not given.",
+    shell_complete=variants_of,
 )
 against = click.option(
     "--against", type=PATH, metavar="BASE", help="Folder of an earlier run: the index shows what has changed."
@@ -119,7 +153,8 @@ def parameters(command: _Work) -> _Work:
 
 def cases(command: _Work) -> _Work:
     """Options that say what is run."""
-    return together(command, click.argument("names", metavar="[CASE]...", nargs=-1), wanted, variant, parameters, out())
+    names = click.argument("names", metavar="[CASE]...", nargs=-1, shell_complete=names_of("cases"))
+    return together(command, names, wanted, variant, parameters, out())
 
 
 def replayed(command: _Work) -> _Work:
@@ -127,7 +162,8 @@ def replayed(command: _Work) -> _Work:
     return together(
         command,
         click.argument("path", metavar="LOG", type=PATH),
-        click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them."),
+        click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them.",
+                     shell_complete=names_of("hw.models")),
         click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
         click.option("--part", type=int, metavar="N", help="Number of the run, if the map separates several."),
         click.option(

@@ -22,3 +22,17 @@ def test_a_command_ends_as_well_without_a_stream(number: int) -> None:
     assert done.returncode == 0, done.stderr
     assert "bouncing_ball" in done.stdout or number == 1
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(("words", "wanted"), [
+    ("run bounc", "plain,bouncing_ball"), ("run red_body -e muj", "plain,mujoco"), ("list pin", "plain,pinocchio"),
+    ("run red_body --variant fr", "plain,frozen"), ("replay -m ba", "plain,ball"), ("gapm", "plain,gapmap"),
+    ("run ./robot", "file,./robot"),
+])  # fmt: skip
+def test_a_shell_completes_commands_and_names(words: str, wanted: str) -> None:
+    asked = {"COMP_WORDS": f"crossbody {words}", "COMP_CWORD": str(len(words.split()))}
+    done = subprocess.run(
+        [COMMAND], env={**os.environ, **asked, "_CROSSBODY_COMPLETE": "bash_complete"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout.split(), done.stderr) == (0, [wanted], "")
