@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -48,11 +49,15 @@ def _parameter(one: Parameter) -> str:
 
 
 def engine(name: str) -> Named:
-    """Return profiles of an engine, and versions of its packages."""
-    from crossbody import engines
+    """Return profiles of an engine, the settings that each has for the bouncing ball, and versions of its packages."""
+    from crossbody import cases, engines
+    from crossbody.reports.judging.stored import words
 
-    found = engines.load(name)
-    return {"Profiles": dict(found.profiles), "Versions": dict(found.versions)}
+    found, ball, settings = engines.load(name), cases.load("bouncing_ball"), dict[str, str]()
+    for profile in found.profiles:
+        with suppress(cases.CaseUnsupported):
+            settings[profile] = words(found.planned(ball, profile))
+    return {"Profiles": dict(found.profiles), "Settings for bouncing_ball": settings, "Versions": dict(found.versions)}
 
 
 def one(name: str) -> Named:

@@ -35,6 +35,9 @@ def test_an_engine_is_listed_with_its_profiles(name: str) -> None:
         pytest.skip(f"{name} is not installed")
     assert told["Profiles"] == dict(engines.load(name).profiles)
     assert told["Versions"]
+    settings, ball = told["Settings for bouncing_ball"], cases.load("bouncing_ball")
+    assert settings.keys() == {one for one in told["Profiles"] if engines.load(name).why_not(ball, one) is None}
+    assert all("max_steps=" in line for line in settings.values())
 
 
 def test_an_unknown_case_is_a_sentence() -> None:
