@@ -239,7 +239,7 @@ def looser(case: Case, entry: Entry) -> float:
     rtol = float(entry.settings.get("rtol", 0.0))
     if not rtol > TOLERANCE or entry.run is None or entry.engine not in engines.names():
         return 1.0
-    own = float(engines.load(entry.engine).prepare(case, entry.profile).settings.get("rtol", TOLERANCE))
+    own = float(engines.load(entry.engine).planned(case, entry.profile).get("rtol", TOLERANCE))
     return max(rtol / max(own, TOLERANCE), 1.0)
 
 

@@ -64,14 +64,18 @@ def changed(case: Case) -> bool:
 
 def differing(case: Case, entry: Entry) -> frozenset[str]:
     """What was looked at in the stored run of that variant, engine and profile, whatever its parameters."""
-    run = _table().get(case.label, {}).get("runs", {}).get(f"{entry.engine}:{entry.profile}")
-    return frozenset() if run is None else frozenset(run["deviations"])
+    return frozenset(_numbers(case, entry))
 
 
 def lacking(case: Case, entry: Entry) -> frozenset[str]:
     """What the stored run of that variant, engine and profile has no number of, whatever its settings."""
+    return frozenset(metric for metric, value in _numbers(case, entry).items() if math.isnan(float(value)))
+
+
+def _numbers(case: Case, entry: Entry) -> Mapping[str, float | str]:
     run = _table().get(case.label, {}).get("runs", {}).get(f"{entry.engine}:{entry.profile}", {"deviations": {}})
-    return frozenset(metric for metric, value in run["deviations"].items() if math.isnan(float(value)))
+    numbers: Mapping[str, float | str] = run["deviations"]
+    return numbers
 
 
 @cache

@@ -154,7 +154,7 @@ def test_an_engine_that_tells_its_tolerance_where_it_is_asked_for_alone_is_judge
 ) -> None:
     """Its own settings have none: judging a run of a user's own engine threw a KeyError."""
     judge_ = judge_of("bouncing_ball", "listing", 1e-7)
-    silent = SimpleNamespace(prepare=lambda case, profile: SimpleNamespace(settings={}))
+    silent = SimpleNamespace(planned=lambda case, profile: {})
     monkeypatch.setattr(engines, "load", lambda name: silent)
     assert comparison.looser(judge_.case, judge_.entry) == pytest.approx(100.0)
 
