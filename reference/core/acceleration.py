@@ -244,6 +244,7 @@ def accelerate(
     SMOOTH the rows follow h'' = 0, whatever law is in force: what is left when the law's own terms are taken away.
     """
     s.rhs += 1
+    s.contradiction = 0.0
     na = s.na
     on = 0.0 if general == SMOOTH else 1.0
     if s.has_solve and general == OWN:
@@ -258,6 +259,8 @@ def accelerate(
         return 1
     if s.frictional:
         ask(SOLVE, s, m, w, NOTHING)
+        if s.contradiction > s.lenient:
+            return 1
     elif s.dependent == 0:
         solve_schur(w.G, na, w.reach, w.r, w.la)
     elif not solve_dependent(s, w, q, v):

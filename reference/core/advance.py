@@ -234,13 +234,19 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 @compiled
 def _all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Whether contacts that let go in turn would jam if all pressed that close; it marks these."""
-    for i in range(s.nc):
-        closes = has_friction(m, i) and b.mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
-        if closes and not is_dry(m, i):
-            b.mode[i] = active_mode(s, m, w, i)
-    activate(s, m, w, b.mode)
-    return bool(_jams(K, s, m, w, b, 0.0))
+    """Whether contacts jam that let go in turn, if none or if all of them press; it marks these.
+
+    Without one that lets go what is left may jam, though all together do not: it would close, and pulls if it does not.
+    """
+    for press in range(2):
+        for i in range(s.nc):
+            closes = has_friction(m, i) and not is_dry(m, i) and w.gap[i] <= 0.0 and w.rate[i] < 0.0
+            if closes and (b.mode[i] == BALLISTIC or w.hit[i] <= s.theta):
+                b.mode[i] = active_mode(s, m, w, i) if press else BALLISTIC
+        activate(s, m, w, b.mode)
+        if _jams(K, s, m, w, b, 0.0):
+            return True
+    return False
 
 
 @compiled
@@ -261,9 +267,9 @@ def _jams(K: Any, s: Any, m: Model, w: Work, b: Buffers, near: float) -> bool:
 
 
 @compiled
-def _stuck(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Why time does not go on: contacts are about to jam, or no step is short enough."""
-    return PAINLEVE if s.frictional and _jams(K, s, m, w, b, JAMMING) else STEP_TOO_SMALL
+def _stuck(K: Any, s: Any, m: Model, w: Work, b: Buffers, code: int) -> int:
+    """Why time does not go on: contacts are about to jam, or what a step found."""
+    return int(PAINLEVE if s.frictional and _jams(K, s, m, w, b, JAMMING) else code)
 
 
 @compiled
@@ -278,8 +284,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.method = EXPLICIT
         before = s.method
         code = stepping.attempt(K, s, m, w, b)
-    if code == STEP_TOO_SMALL:
-        return _stuck(K, s, m, w, b)
+    if code in (STEP_TOO_SMALL, NOT_FINITE) or (code == ILL_POSED and not s.loops):
+        return _stuck(K, s, m, w, b, code)
     if code != 0:
         return code
     code = events.scan(K, s, m, w, b.mode)
@@ -290,7 +296,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.steps += 1
     s.implicit_steps += s.method == IMPLICIT
     if code != 0:
-        return int(code)
+        return _stuck(K, s, m, w, b, code) if code == NOT_FINITE else int(code)
     if s.ng > 0 and not all_finite(w.guards[NODES - 1]):
         return NOT_FINITE
     fired = s.theta <= 1.0
@@ -301,7 +307,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.trial_rhs += s.rhs - before_rows  # what is written down is no work of the method, and chooses none
     s.standing = s.standing + 1 if fired and t == s.t_old else 0
     if s.standing > STANDSTILL + s.nc:
-        return _stuck(K, s, m, w, b)
+        return _stuck(K, s, m, w, b, STEP_TOO_SMALL)
     if fired:
         _land(K, s, m, w)
         _remember_step(s, before)
@@ -310,7 +316,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)
-    if s.frictional and ask(RENEW, s, m, w, NOTHING) > 0.0 and not at_stop:
+    if s.frictional and (ask(RENEW, s, m, w, NOTHING) > 0.0 or s.parting) and not at_stop:
         s.theta = 1.0
         return _switch(K, s, m, w, b)
     if s.audited:
@@ -320,7 +326,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     record.step_end(K, s, m, w, b.mode, b.out, b.modes)
     if s.method == EXPLICIT or s.method == IMPLICIT:
         choice.choose_method(s, w)
-    if s.idle > 0:
+    if s.idle > 0 or (s.parting and not s.frictional):
         code = _share_anew(K, s, m, w, b)
     if at_stop and s.stop < s.t_end:
         _take_inputs(K, s, m, w, b)

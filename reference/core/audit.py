@@ -56,11 +56,14 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
         q, v = w.y1[: s.nq], w.y1[s.nq :]
         if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t + s.hs, q, v, GENERAL) != 0:
             return True  # redundant for the general algebra: nothing to compare with
+    open_by = 0.0
+    for j in range(s.na if s.contradiction > 0.0 else 0):  # what rows that depend on each other leave of their laws
+        open_by += s.contradiction * w.allowed[j]
     for j in range(s.na):
         if s.frictional and (is_shared(s, m, w, w.idx[j]) or (s.loops and bears_nothing(m, w, j))):
             continue  # or loops hold it, as its elimination has checked
         missing, rounding = _residual(s, m, w, b.mode, j, stage)
-        if missing <= CLOSE * w.scale[j] + rounding:
+        if missing <= CLOSE * w.scale[j] + rounding + open_by:
             continue
         weigh(s, m, w, w.la)
         if not missing <= WRONG * (w.scale[j] + pushed(m, w, j)) + 64.0 * rounding:

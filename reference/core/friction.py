@@ -41,6 +41,12 @@ def has_friction(m: Model, i: int) -> bool:
 
 
 @compiled
+def is_decided(w: Work, i: int) -> bool:
+    """Whether the search for modes decides on row i: it has friction, or presses without beside rows that have."""
+    return bool(w.decides[i])
+
+
+@compiled
 def is_dry(m: Model, i: int) -> bool:
     """Whether row i has dry friction of its own: its own tangential row, always in contact, of a constant bound."""
     return bool(m.tangent[i] == i)

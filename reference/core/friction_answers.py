@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core import cones, coulomb, jams, loops, slips, sticking, turning, undetermined
+from crossbody.reference.core import cones, coulomb, jams, loops, mode_set, slips, sticking, turning, undetermined
 from crossbody.reference.core.friction import (
     BEGIN,
     BEGIN_SLIP,
@@ -72,6 +72,8 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         return float(coulomb.factor(s, m, w, i != 0))
     if what == SOLVE:
         coulomb.solve(s, m, w, w.r, w.la)
+        if s.dependent_rows > 0:
+            s.contradiction = mode_set.contradiction(s, w, w.r, w.la)
         if s.loops:
             loops.complete(s, m, w, w.r, w.la, True)
     elif what == RESPOND:
@@ -104,5 +106,5 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == SETTLED:
         undetermined.follow_shares(s, m, w, True)
     elif what == BEGIN:
-        slips.begin(w)
+        slips.begin(s, m, w)
     return 0.0

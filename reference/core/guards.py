@@ -17,7 +17,6 @@ from crossbody.reference.core.friction import (
     bound,
     decided_to,
     has_begun,
-    has_friction,
     most_drift,
     slip,
     slip_along,
@@ -140,7 +139,7 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
             w.parts[0], w.parts[1] = h - s.touch, rate
         else:
             w.parts[0] = rate
-            if s.frictional and has_friction(m, i):  # its multiplier is infinite where it would jam
+            if s.frictional:  # its multiplier is infinite where it would jam, and says nothing where rows are dependent
                 w.parts[1] = off_law(K, s, m, w, i, t, q, v)
             else:
                 lam = multiplier_if_active(K, s, m, w, mode, i, t, q, v)

@@ -311,7 +311,7 @@ def _all_push(s: Any, m: Model, w: Work) -> bool:
     Where rows hardly depend on each other a smallest set would load a third row otherwise, and the two would disagree
     on whether it pushes.
     """
-    if not solve_dependent(s, w, w.y[: s.nq], w.y[s.nq :]):
+    if not solve_dependent(s, w, w.y[: s.nq], w.y[s.nq :]) or s.contradiction > 1.0:
         return False
     noise(s, m, w)
     return bool(_most_pulling(s, w) < 0)

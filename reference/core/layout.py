@@ -33,11 +33,11 @@ FUNCTIONS_MOST = 4  # that make up one guard
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
 SETS = 64  # of modes that are remembered while those of friction are decided
 OF_FRICTION = (
-    "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "stands", "state",
-    "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among", "seen",
-    "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated", "turn_by",
-    "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn", "borne",
-    "even", "known", "off_by",
+    "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "decides", "stands",
+    "state", "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among",
+    "seen", "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated",
+    "turn_by", "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
+    "borne", "even", "known", "off_by",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -97,6 +97,10 @@ STATE = np.dtype(
         ("na", "i8"),
         ("idle", "i8"),  # rows in contact that carry nothing: the active ones hold them
         ("dependent", "i8"),  # active rows that depend on those before them
+        ("contradiction", "f8"),  # times what is allowed by which such rows are off their laws, as evaluated last
+        ("lenient", "f8"),  # the most that an evaluation may find of it
+        ("parting", "i8"),  # at the step's end it is more than is allowed
+        ("barred", "i8"),  # 1 + the contact that lets go for ever as long as it may press at this instant, 0 for none
         ("redundant", "i8"),  # the most rows at one instant that follow from others
         ("have_dense", "i8"),
         ("have_mass", "i8"),
@@ -250,6 +254,7 @@ class Work:
     r: Floats
     scale: Floats  # size of the terms behind each row's right-hand side
     noise: Floats  # (nc,) what rounding alone may make of each multiplier
+    own_noise: Floats  # (nc,) that of the active rows, while another one is tried beside them
     pull: Floats  # (n,) sum of |H^T lam|, term by term, of active rows as they were last weighed
     shift: Floats  # (n,) likewise of |M^-1 H^T lam|
     ha: Floats  # active rows, compact: gap, rate, multiplier
@@ -326,6 +331,7 @@ class Work:
     slides: Bytes  # rows of contacts that slide
     off: Bytes  # rows that are left out while modes are decided
     listed: Index  # where each row stands among those in contact
+    decides: Bytes  # rows on which the search for modes decides
     stands: Bytes  # contacts without a slip velocity
     state: Bytes  # mode that is tried
     wants: Bytes  # mode that each contact would rather have

@@ -27,7 +27,7 @@ from crossbody.reference.core.acceleration import (
     scatter,
     weigh,
 )
-from crossbody.reference.core.algebra import ULP, all_finite, inverse_diagonal, solve_mass, solve_schur
+from crossbody.reference.core.algebra import ULP, all_finite, copy, inverse_diagonal, solve_mass, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
 from crossbody.reference.core.friction import STANDS, ask, decided_to, has_friction
 from crossbody.reference.core.layout import (
@@ -190,8 +190,12 @@ def evaluate(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
 def multiplier_if_active(
     K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, t: float, q: Floats, v: Floats
 ) -> float:
-    """Lam of row i if it were active now, from the same equations that the row would use; noise[i] beside it."""
-    before = mode[i]
+    """Lam of row i if it were active now, from the same equations that the row would use; noise[i] beside it.
+
+    That of the active rows stays: beside a row that nearly depends on them it would hide where they let go.
+    """
+    copy(w.noise, w.own_noise)
+    before, unsure = mode[i], s.unsure
     mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, mode)
     lam, dependent = -np.inf, -1
@@ -208,6 +212,8 @@ def multiplier_if_active(
         lam = _lacks(K, s, m, w, i, dependent, lam, t, q, v)
     if s.method == EXACT and s.na > 0:  # the arc stands on the factor of its own rows
         accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, GENERAL)
+    w.own_noise[i], s.unsure = w.noise[i], unsure
+    copy(w.own_noise, w.noise)
     return float(lam)
 
 

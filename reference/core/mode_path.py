@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.friction import bound, decided_to, has_friction, is_dry
+from crossbody.reference.core.friction import bound, decided_to, is_decided, is_dry
 from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
 from crossbody.reference.core.mode_search import change, goes_on, judge, sweep
 from crossbody.reference.core.mode_set import first_row, size_along
@@ -50,7 +50,7 @@ def _first_to_yield(s: Any, m: Model, w: Work) -> tuple[int, int, float]:
     found, becomes, part = -1, FREE, WHOLE
     for j in range(s.na):
         i = w.idx[j]
-        if not has_friction(m, i) or w.state[i] == FREE:
+        if not is_decided(w, i) or w.state[i] == FREE:
             continue
         if not is_dry(m, i) and -w.la[j] * w.gram[j, j] > decided_to(s):
             pulls = max(w.borne[j], 0.0) / (max(w.borne[j], 0.0) - w.la[j])
@@ -80,7 +80,7 @@ def approached(s: Any, m: Model, w: Work) -> bool:
     changes = 0
     for j in range(s.na):
         w.borne[j] = w.la[j]
-        changes += CHANGES * has_friction(m, w.idx[j])
+        changes += CHANGES * is_decided(w, w.idx[j])
     for _ in range(changes):
         worst = judge(s, m, w)
         if worst < 0:

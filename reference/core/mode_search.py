@@ -20,10 +20,20 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.beginnings import look_around, turn
-from crossbody.reference.core.friction import bound, decided_to, has_friction, is_dry
+from crossbody.reference.core.friction import bound, decided_to, has_friction, is_decided, is_dry
 from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loops import is_idle
-from crossbody.reference.core.mode_set import ahead, aside, evaluate_set, first_row, jammed, keep, put, size_along
+from crossbody.reference.core.mode_set import (
+    ahead,
+    aside,
+    contradiction,
+    evaluate_set,
+    first_row,
+    jammed,
+    keep,
+    put,
+    size_along,
+)
 
 SWEEPS = 60
 TURNS = 40  # of directions of slip towards those of acceleration
@@ -37,9 +47,10 @@ WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 def _worst(s: Any, m: Model, w: Work) -> int:
     """The contact that violates its mode most, -1 if none does; w.wants has the modes that all would rather have."""
     found, most = -1, decided_to(s)
+    contradict = s.dependent_rows > 0 and contradiction(s, w, w.full, w.load) > 1.0
     for j in range(s.na):
         i = w.idx[j]
-        if not has_friction(m, i):
+        if not is_decided(w, i):
             continue
         w.wants[i] = w.state[i]
         if w.state[i] == FREE:
@@ -48,6 +59,10 @@ def _worst(s: Any, m: Model, w: Work) -> int:
                 missing = np.inf
         else:
             missing, becomes = -w.load[j] * w.gram[j, j], FREE
+            if contradict:  # with rows that it depends on, and its gap opens faster than its law
+                missing = max(missing, w.excess[j])
+            if i + 1 == s.barred:
+                missing = np.inf
             if is_dry(m, i):
                 missing = -1.0
             other, then = -1.0, STICK
@@ -133,7 +148,7 @@ def iterate(s: Any, m: Model, w: Work, together: int) -> bool:
             return goes_on(s, m, w)
         for j in range(s.na):
             k = w.idx[j]
-            if has_friction(m, k) and (k == i or together == ALL) and w.wants[k] != w.state[k]:
+            if is_decided(w, k) and (k == i or together == ALL) and w.wants[k] != w.state[k]:
                 change(m, w, k, w.wants[k])
     return False
 
@@ -186,12 +201,12 @@ def sweep(s: Any, m: Model, w: Work) -> None:
                     w.la[c] *= min(1.0, most / size) if size > 0.0 else 1.0
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i):
+        if is_decided(w, i):
             if w.stands[i]:
                 aim(m, w, i)
             if w.la[j] * w.gram[j, j] <= decided_to(s) and not is_dry(m, i) and not (s.loops and is_idle(w, j)):
                 put(m, w, i, FREE)
-            elif w.stands[i] and size_along(m, w, i, w.la) < (1.0 - BELOW) * bound(m, i, w.la[j]):
+            elif w.stands[i] and size_along(m, w, i, w.la) <= (1.0 - BELOW) * bound(m, i, w.la[j]):
                 put(m, w, i, STICK)
             else:
                 put(m, w, i, SLIP)
@@ -213,12 +228,14 @@ def vary(s: Any, m: Model, w: Work, number: int) -> int:
     changed = 0
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i):
+        if is_decided(w, i):
             digit, number = number % 4, number // 4
             changed += digit > 0
             start = w.sets[0, i]
             state = start if digit == 0 else (STICK if digit == 1 else SLIP)
-            if digit == 3 and w.stands[i]:
+            if not has_friction(m, i):
+                state = start if digit == 0 else (FREE if start == STICK else STICK)
+            elif digit == 3 and w.stands[i]:
                 for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
                     w.way[w.idx[c]] = -w.way[w.idx[c]]
             elif digit == 3 or (digit == 1 and not w.stands[i]) or digit == start_digit(start):
@@ -244,7 +261,7 @@ def near_sets(s: Any, m: Model, w: Work) -> bool:
     keep(s, w)
     contacts = 0
     for j in range(s.na):
-        contacts += has_friction(m, w.idx[j])
+        contacts += is_decided(w, w.idx[j])
     tried, all_sets, jam = 0, 4 ** min(contacts, 12), -1
     for differing in range(contacts + 1):
         for number in range(all_sets):

@@ -8,10 +8,11 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.coulomb import factor_set, solve
-from crossbody.reference.core.friction import has_friction, is_dry, slip, small_slip
+from crossbody.reference.core.friction import has_friction, is_decided, is_dry, slip, small_slip
 from crossbody.reference.core.jams import JAMMED, determinant
 from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loops import is_idle, is_loop
+from crossbody.reference.core.shares import allow
 from crossbody.reference.kinds import Array
 
 CLEAR_OF_A_JAM = 1e-5  # determinant, of rows of size 1, of what goes on where others jam
@@ -42,7 +43,7 @@ def look(s: Any, m: Model, w: Work) -> None:
             s.push_scale = max(s.push_scale, w.scale[j])
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i):
+        if is_decided(w, i):
             size = slip(m, w, i, w.rate)
             w.slid[i] = w.slides[i] and size > 0.0
             fresh = w.begins[i] or w.since[i] == s.t or (s.jumps and size <= small_slip(s))
@@ -58,7 +59,7 @@ def put_as_they_are(s: Any, m: Model, w: Work) -> None:
     """Let contacts that stand stick, unless they have reached their bounds, and the others slide."""
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i):
+        if is_decided(w, i):
             put(m, w, i, STICK if w.stands[i] and not w.begins[i] else SLIP)
 
 
@@ -67,7 +68,7 @@ def put_as_they_stand(s: Any, m: Model, w: Work) -> None:
     """Let all contacts that stand stick, and the others slide."""
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i):
+        if is_decided(w, i):
             put(m, w, i, STICK if w.stands[i] else SLIP)
 
 
@@ -122,6 +123,20 @@ def _exceed(s: Any, w: Work, r: Array, la: Array) -> None:
 
 
 @compiled
+def contradiction(s: Any, w: Work, r: Array, la: Array) -> float:
+    """By how many times what is allowed the normal rows that are solved for are off r under the multipliers la."""
+    allow(s, w, w.y[: s.nq], w.y[s.nq :])
+    most = 0.0
+    for a in range(s.normals):
+        j = w.unknown[a]
+        total = -r[j]
+        for c in range(s.na):
+            total += w.gram[j, c] * la[c]
+        most = max(most, abs(total) / w.allowed[j] if total != 0.0 else 0.0)
+    return float(most)
+
+
+@compiled
 def size_along(m: Model, w: Work, i: int, x: Array) -> float:
     """Size of the tangential part of contact i of x."""
     square = 0.0
@@ -160,7 +175,7 @@ def put_back(s: Any, m: Model, w: Work) -> None:
     """Put contacts back into the set that was kept."""
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i):
+        if is_decided(w, i):
             for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
                 w.way[w.idx[c]] = w.kept_way[w.idx[c]]
             put(m, w, i, w.sets[0, i])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core.friction import has_friction, is_dry
+from crossbody.reference.core.friction import has_friction, is_decided, is_dry
 from crossbody.reference.core.layout import SLIP, Model, Work
 from crossbody.reference.core.mode_search import aim, judge, vary
 from crossbody.reference.core.mode_set import (
@@ -27,8 +27,8 @@ DEFINITE = 1e-6  # square of a pivot, of rows of size 1, from which on a matrix 
 
 @compiled
 def _choices(m: Model, w: Work, i: int) -> int:
-    """How many modes a contact may have: what slides goes on as it does, or presses no more."""
-    return 4 if w.stands[i] else 2
+    """How many modes a contact may have: what slides, or has no friction, goes on as it does, or presses no more."""
+    return 4 if w.stands[i] and has_friction(m, i) else 2
 
 
 @compiled
@@ -37,7 +37,7 @@ def _number(s: Any, m: Model, w: Work, place: int) -> int:
     number, unit = 0, 1
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i):
+        if is_decided(w, i):
             digit, place = place % _choices(m, w, i), place // _choices(m, w, i)
             number += unit * (digit if w.stands[i] else 2 * digit)
             unit *= 4
@@ -105,11 +105,22 @@ def _is_definite(S: Floats, n: int) -> bool:
 
 
 @compiled
+def _has_cones(s: Any, m: Model, w: Work) -> bool:
+    """Whether a bound of friction grows with a load: without, the motion is that of least constraint, and unique."""
+    count = 0
+    for j in range(s.na):
+        count += has_friction(m, w.idx[j]) and not is_dry(m, w.idx[j])
+    return bool(count > 0)
+
+
+@compiled
 def count_others(s: Any, m: Model, w: Work) -> None:
     """Note whether another set is consistent as well and leads to another motion, or that there are too many to try.
 
     Contacts that all slide may be such: friction makes what they do to each other no P-matrix, though it is symmetric.
     """
+    if not _has_cones(s, m, w):
+        return
     keep(s, w)
     monotone = _is_monotone(s, m, w)
     put_back(s, m, w)
@@ -117,7 +128,7 @@ def count_others(s: Any, m: Model, w: Work) -> None:
         return
     sets = 1
     for j in range(s.na):
-        if has_friction(m, w.idx[j]) and sets <= FEW:
+        if is_decided(w, w.idx[j]) and sets <= FEW:
             sets *= _choices(m, w, w.idx[j])
     if sets > FEW:
         s.not_searched += 1

@@ -10,11 +10,10 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, is_active
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.collisions import collide
-from crossbody.reference.core.friction import BEGIN, DECIDE, NOTHING, SETTLED, ask, has_friction
+from crossbody.reference.core.friction import BEGIN, DECIDE, NOTHING, SETTLED, ask, has_friction, is_decided
 from crossbody.reference.core.holding import MOVED, doubtful, hold
 from crossbody.reference.core.journal import change, keep_discrete, move, remember, write_discrete
 from crossbody.reference.core.layout import (
-    BALLISTIC,
     EDGE,
     FREE,
     ILL_POSED,
@@ -26,7 +25,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise, touching
+from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise, released_mode, touching
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
@@ -39,21 +38,17 @@ SWITCH_ROUNDS = 32  # switches that follow one another at one instant
 def _want(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
     """Where every row belongs by the mode set as it stands, into w.struck; of a machine that pivots, the first alone.
 
-    The level machine's active rows come first: what the others ask for overwrites the noise of these. The others pivot
-    by least index, as a complementarity problem is solved.
+    The others than the level machine pivot by least index, as a complementarity problem is solved.
     """
-    level = s.fsm == LEVEL
     for i in range(s.nc):
         w.struck[i] = b.mode[i]
-    for turn in range(2 if level else 1):
-        for i in range(s.nc):
-            now = b.mode[i]
-            apart = level and now == FREE and w.gap[i] > s.touch  # most rows: they stay so
-            later = level and is_active(now) != (turn == 0)
-            if not apart and not later and m.unilateral[i] and m.follows[i] < 0:
-                w.struck[i] = next_mode(K, s, m, w, b.mode, i)
-                if not level and w.struck[i] != now:
-                    return
+    for i in range(s.nc):
+        now = b.mode[i]
+        apart = s.fsm == LEVEL and now == FREE and w.gap[i] > s.touch  # most rows: they stay so
+        if not apart and m.unilateral[i] and m.follows[i] < 0:
+            w.struck[i] = next_mode(K, s, m, w, b.mode, i)
+            if s.fsm != LEVEL and w.struck[i] != now:
+                return
 
 
 @compiled
@@ -112,10 +107,12 @@ def share(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
     Leaves k[0], lam0 and the gaps of node 0 for the next step, as `settle` does.
     """
+    before, s.lenient = s.lenient, np.inf
     code = hold(K, s, m, w, b)
     if code == 0:
         code = evaluate(K, s, m, w, b.mode)
         _keep(w)
+    s.lenient = before
     return int(code)
 
 
@@ -129,7 +126,7 @@ def _keep(w: Work) -> None:
 
 @compiled
 def _decide_friction(s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Put every contact with friction in the mode that the present instant asks for, after it was evaluated.
+    """Put every contact in the mode that the present instant asks for, after it was evaluated.
 
     Returns:
         0, or NO_CONSISTENT_MODES or PAINLEVE; with one of these the last line of the history marks contacts.
@@ -138,13 +135,27 @@ def _decide_friction(s: Any, m: Model, w: Work, b: Buffers) -> int:
     for i in range(s.nc):
         if code != 0:
             b.history[len(b.history) - 1, i] = w.wants[i]
-        elif has_friction(m, i) and is_active(b.mode[i]):
-            after = w.state[i]
-            if after == FREE and w.gap[i] <= 0.0:
-                after = BALLISTIC
+        elif is_decided(w, i) and is_active(b.mode[i]):
+            after = w.state[i] if has_friction(m, i) else b.mode[i]
+            if w.state[i] == FREE:
+                after = released_mode(b.mode[i], w.gap[i])
             if after != b.mode[i]:
                 change(s, b, i, after)
     return code
+
+
+@compiled
+def _bars(s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Bar a contact that lets go for ever as long as it may press, if others may carry on for it; whether there is one.
+
+    The share of least norm leaves it no load, but without it there is another such share, under which it presses.
+    """
+    if not s.frictional or s.dependent_rows == 0 or s.barred != 0:
+        return False
+    for i in range(s.nc):
+        if has_friction(m, i) and is_active(b.mode[i]) and not is_active(w.settled[i]):
+            s.barred = i + 1
+    return bool(s.barred != 0)
 
 
 @compiled
@@ -184,6 +195,9 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.history, s.one_by_one = 0, 0  # another velocity: mode sets may stand again
             continue
         if remember(s, b):
+            if s.one_by_one and _bars(s, m, w, b):
+                s.history = 0
+                continue
             if s.one_by_one:  # the set that stands again is the one of rows that depend on each other, or a cycle
                 code = evaluate(K, s, m, w, b.mode) if s.one_by_one == ALONE else 0
                 return int(code) if code != 0 else MODE_CYCLE
@@ -238,6 +252,7 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         0, EVENTS_FULL if the caller must make room and come again, or a negative code. After MODE_CYCLE the last line
         of the history marks the rows that switch for ever.
     """
+    s.lenient, s.barred = np.inf if s.frictional else 1.0, 0
     if s.frozen or s.fsm == MEMORYLESS:
         s.touch = touching(s, w)
     code = _iterate(K, s, m, w, b)
@@ -259,4 +274,5 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         code = evaluate(K, s, m, w, b.mode)
         ask(SETTLED, s, m, w, NOTHING)
     begin_watch(K, s, m, w)
+    s.lenient = np.inf
     return int(code)

@@ -15,6 +15,7 @@ from crossbody.reference.core.algebra import ULP, solve_schur
 from crossbody.reference.core.layout import Work
 from crossbody.reference.kinds import Array
 
+LENIENT = 4.0  # times what is allowed, within a step: one that finds more is taken anew, a quarter as long
 CONSISTENT = 1e-9  # part of its terms by which a row that depends on others may be off its law, and at least rtol
 STATE = 64.0 * ULP  # part of the coordinates that rounding moves a gap by
 
@@ -34,8 +35,8 @@ def allow(s: Any, w: Work, q: Array, v: Array) -> None:
 
 
 @compiled
-def _null_vector(s: Any, w: Work, d: int, z: Array) -> bool:
-    """Z = e_d - c with row d = sum of c_j times row j; whether their right-hand sides agree as much."""
+def _null_vector(s: Any, w: Work, d: int, z: Array) -> float:
+    """Z = e_d - c with row d = sum of c_j times row j; by how many times what is allowed their laws contradict it."""
     G = w.G
     for j in range(s.na):
         z[j] = -G[d, j] if w.reach[d] <= j < d else 0.0
@@ -48,7 +49,7 @@ def _null_vector(s: Any, w: Work, d: int, z: Array) -> bool:
     for j in range(d + 1):
         total += z[j] * w.r[j]
         most += abs(z[j]) * w.allowed[j]
-    return bool(abs(total) <= most)
+    return float(abs(total) / most) if total != 0.0 else 0.0
 
 
 @compiled
@@ -65,8 +66,9 @@ def _without(na: int, x: Array, z: Array) -> None:
 def solve_dependent(s: Any, w: Work, q: Array, v: Array) -> bool:
     """Fill la of least norm from r and the factor of rows that depend on each other; False if these contradict.
 
-    By as much as they do not agree each is off its law: rows that depend on others in one order, and not in another,
-    would else move the rest by that, and rows which nothing presses would join and let go for ever.
+    They may by s.lenient times what is allowed; s.contradiction has by how many. By as much as they do not agree each
+    is off its law: rows that depend on others in one order, and not in another, would else move the rest by that, and
+    rows which nothing presses would join and let go for ever.
     """
     na = s.na
     allow(s, w, q, v)
@@ -75,7 +77,8 @@ def solve_dependent(s: Any, w: Work, q: Array, v: Array) -> bool:
         if w.G[d, d] < np.inf:
             continue
         z = w.null[count]
-        if not _null_vector(s, w, d, z):
+        s.contradiction = max(s.contradiction, _null_vector(s, w, d, z))
+        if not s.contradiction <= s.lenient:
             return False
         for known in range(count):
             _without(na, z, w.null[known])

@@ -26,8 +26,16 @@ LINGERS = 10.0  # times as long as friction takes to stop what has no direction:
 
 
 @compiled
-def begin(w: Work) -> None:
-    """Forget what another run of the same workspace has left."""
+def begin(s: Any, m: Model, w: Work) -> None:
+    """Forget what another run of the same workspace has left, and note the rows on which the search for modes decides.
+
+    A row that another one follows, which is no friction, is none of them: its multiplier has either sign.
+    """
+    for i in range(s.nc):
+        w.decides[i] = has_friction(m, i) or (m.unilateral[i] and m.follows[i] < 0)
+    for i in range(s.nc):
+        if m.follows[i] >= 0 and not has_friction(m, m.follows[i]):
+            w.decides[m.follows[i]] = 0
     for left in (w.way, w.rest, w.tolerated, w.open_v, w.open_rate):
         left[:] = 0.0
     w.off[:], w.begins[:], w.since[:], w.within[:] = 0, 0, -np.inf, np.inf

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import audit, bogacki, choice, dense, dop853, esdirk, exact, folds
 from crossbody.reference.core.acceleration import scatter
@@ -24,6 +26,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
+from crossbody.reference.core.shares import LENIENT
 
 FAR = 1e30  # beyond this a motion has diverged
 MAX_REJECTIONS = 60
@@ -73,6 +76,7 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             dop853.keep(K, s, m, w, t, w.y1[:nq], w.y1[nq:], end)
     if not known and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
+    s.parting = s.contradiction > 1.0
     scatter(s, w, w.lams[last])
     if s.nc > 0:
         s.guards += 1
@@ -106,6 +110,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     clipped = False
     rejected = False
     ill = 0
+    s.lenient = LENIENT
     longest = choice.longest_step(s, m, w)
     for _ in range(MAX_REJECTIONS):
         h = min(s.h, longest)
@@ -123,6 +128,7 @@ def attempt(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.cautious = max(0, s.cautious - 1)
             if s.method == EXPLICIT and s.stalled >= choice.STALLED_STEPS - 1:
                 s.promised = choice.promised_step(s, m, w, h)
+            s.lenient = np.inf
             return _finish(K, s, m, w, b)
         s.rejected += 1
         rejected = True

@@ -128,7 +128,9 @@ class Balance:
         N, S, A = slice(0, self.unknowns.count), slice(self.unknowns.count, None), self.A
         inverse = np.asarray(np.linalg.pinv(A[..., N, N], rcond=DEPENDENT), dtype=np.float64)
         held = inverse @ A[..., N, S]
-        return inverse, held, A[..., S, S] - A[..., S, N] @ held
+        left, values, right = np.linalg.svd(A[..., S, S] - A[..., S, N] @ held)
+        values[values <= DEPENDENT * self._factors[1][..., :1]] = 0.0  # rounding of rows that the normal ones move
+        return inverse, held, (left * values[..., None, :]) @ right
 
     def _in_turn(self, b: Floats) -> Floats:
         """Solve for the normal rows, and in what they leave for the others."""
@@ -172,6 +174,14 @@ class Balance:
         known = self.unknowns
         size: Floats = np.sqrt((y / self.size[..., known.count :]) ** 2 @ known.bears)
         return size
+
+    def contradiction(self, lam: Floats) -> Floats:
+        """By how many times what is allowed the normal rows that are solved for are off their laws under lam (m,)."""
+        places = self.unknowns.places[: self.unknowns.count]
+        off = np.abs(_times(self.seen.G, lam) - self.seen.bare - self.seen.pull)
+        tiny = np.finfo(float).tiny
+        most: Floats = (off / np.maximum(self.seen.allowed, tiny))[..., places].max(axis=-1, initial=0.0)
+        return most
 
     def _exceeds(self, x: Floats) -> Flags:
         return np.asarray((self._force(x[..., self.unknowns.count :]) > self._bounds(x)).any(axis=-1))

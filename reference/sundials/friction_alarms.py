@@ -33,6 +33,8 @@ def alarms(machine: FrictionMachine, guards: int) -> list[Alarm]:
     told = list[tuple[int, str, bool]]()
     for i in machine.rows:
         told += [(i, tells, True) for tells in _told(machine.modes[i], i in machine.sliding.dry)]
+    if len(pressing := machine.contacts()) > 1:
+        told.append((pressing[0], "PART", True))
     told += [(k, "WATCH", False) for k in range(guards)]
     found, count = list[Alarm](), 0
     for i, tells, armed in told:
@@ -69,6 +71,8 @@ def values(machine: FrictionMachine, times: list[float], q: Floats, v: Floats) -
             found.append(-gap[:, i])
         elif tells == "CATCH":
             found += [rate[:, i], machine.above_law(seen, balance, lam, i)]
+        elif tells == "PART":  # rows that depend on each other have come to contradict each other
+            found.append(1.0 - balance.contradiction(lam))
         elif tells != "WATCH":
             found += _along(machine, balance, alarm, lam, bare)
     watched = np.zeros((len(times), count))

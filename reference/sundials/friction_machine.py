@@ -43,7 +43,7 @@ class FrictionMachine(LevelMachine):
         super().__init__(system, equations)
         self.rtol, self.tolerance, self.watch = rtol, tolerance, system.watch
         self.guards_watched = system.guards if system.watch is not None else 0
-        self.sliding = Sliding(system, equations)
+        self.sliding = Sliding(system, equations, rtol)
         self.ways: dict[int, Floats] = {}
         self.begun: set[int] = set()
         self.alarms: list[Alarm] = []

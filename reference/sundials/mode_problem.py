@@ -32,6 +32,7 @@ AROUND = 16  # directions of one contact from which its slip is looked for, for 
 OTHERWISE = 1e-6  # part of the largest acceleration by which other motions differ
 FAR = 1e6  # times what one row alone would ask for: sweeps that lead there diverge
 SETTLED = 1e-14  # part of the largest multiplier by which the last sweep changes any
+OPEN = 0.5  # part of what rows that depend on each other may be off their laws, where modes are decided
 WITHIN = 1e-7  # part of its bound by which a force must stay below it to count as that of a contact that sticks
 
 
@@ -85,8 +86,8 @@ class ModeProblem:
 
     def others(self, found: Tried) -> bool | None:
         """Whether another set agrees with its forces as well and moves otherwise; None if there are too many to try."""
-        if self._one_motion():
-            return False
+        if not any(i in self.sliding.ways and i not in self.sliding.dry for i in self.modes) or self._one_motion():
+            return False  # where no bound of friction grows with a load the motion is that of least constraint
         if math.prod(len(self._choices(i, np.ones(1))) for i in self.modes) > OTHERS:
             return None
         turns = np.exp(2j * np.pi * np.linspace(0.0, 1.0, AROUND // max(len(self.stands), 1), endpoint=False))
@@ -189,6 +190,7 @@ class ModeProblem:
     def _violated(self, tried: Tried) -> dict[int, tuple[float, Mode]]:
         """By how much contacts violate their modes, m/s^2, and the modes that they would rather have."""
         found: dict[int, tuple[float, Mode]] = {}
+        apart = self._contradict(tried)
         for i, mode in tried.modes.items():
             k, heavy = self.seen.at[i], self.seen.G[self.seen.at[i], self.seen.at[i]]
             if mode == Mode.FREE:
@@ -197,11 +199,15 @@ class ModeProblem:
                 ]
             else:
                 off = [(-tried.lam[k] * heavy, Mode.FREE)] if i not in self.sliding.dry else [(-1.0, mode)]
+                if apart and i not in self.sliding.dry:
+                    off.append((float(tried.excess[k]), Mode.FREE))
                 ways = self._along(i)
                 if mode == Mode.STICK:
                     force = float(np.linalg.norm(tried.lam[ways]))
                     bound = max(self.sliding.bound(self.seen, tried.lam, i), 0.0)
                     off.append(((force - bound) * heavy, Mode.SLIP))
+                    moved = float(np.linalg.norm(tried.excess[ways])) if i in self.sliding.dry else 0.0
+                    off.append((moved if moved > OTHERWISE * self.scale else 0.0, Mode.SLIP))  # by rows it depends on
                 elif mode == Mode.SLIP and i in self.stands:
                     off.append((-float(tried.ways[i] @ tried.excess[ways]), Mode.STICK))
                     if len(ways) > 1:
@@ -210,6 +216,11 @@ class ModeProblem:
             if worst[0] > self.limit:
                 found[i] = worst
         return found
+
+    def _contradict(self, tried: Tried) -> bool:
+        """Whether contacts that press depend on each other, and cannot all follow their laws."""
+        places = [self.seen.at[i] for i, mode in tried.modes.items() if mode != Mode.FREE and i not in self.sliding.dry]
+        return bool((np.abs(tried.excess) > OPEN * self.seen.allowed)[places].any())
 
     def _pivoted(self, modes: dict[int, Mode], ways: dict[int, Floats], alone: bool = False) -> Tried | None:
         """Change what is violated, all of it or the worst alone, until nothing is; None where sets come again."""
@@ -225,8 +236,10 @@ class ModeProblem:
             for i in [max(wrong, key=lambda i: wrong[i][0])] if alone else list(wrong):
                 modes[i] = wrong[i][1]
                 if modes[i] == Mode.SLIP and i in self.stands:
-                    force = tried.lam[self._along(i)]
-                    ways[i] = -force / np.linalg.norm(force)
+                    along = self._along(i)
+                    drive = tried.excess[along] if i in self.sliding.dry else -tried.lam[along]
+                    drive = drive if drive.any() else -tried.lam[along]
+                    ways[i] = drive / np.linalg.norm(drive)
         return None
 
     def _searched(self, modes: dict[int, Mode]) -> Tried | None:

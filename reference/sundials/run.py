@@ -145,7 +145,8 @@ class SundialsRun:
             if at_stop and stop < t_end:
                 stop = self._take_inputs()
                 self._give()
-            if switched or (at_stop and self.state.t < t_end):
+            s = self.state
+            if switched or (s.t < t_end and (at_stop or self.machine.contradicts(s.t, s.q, s.v))):
                 view = self._settle(switched)
                 arc = self._arc(view)
             else:

@@ -101,6 +101,13 @@ class _Rows:
         self.allowed = (CONSISTENT * terms + state) / self.length
 
 
+def allowed(e: Equations, t: float, q: Floats, v: Floats, rows: list[int]) -> Floats:
+    """By how much rows in contact may be off their laws where some depend on others, m/s^2."""
+    at = _Rows(e, t, q, v, rows)
+    found: Floats = at.allowed * at.length
+    return found
+
+
 def share(
     e: Equations, t: float, q: Floats, v: Floats, rows: Sequence[int], bilateral: Sequence[int], spent: Collection[int]
 ) -> Sharing | None:

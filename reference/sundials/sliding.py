@@ -12,6 +12,7 @@ from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.balance import Balance, Unknowns
 from crossbody.reference.sundials.equations import Ended, Equations
+from crossbody.reference.sundials.sharing import CONSISTENT, STATE
 
 DRIFT = 1e-6  # part of positions and velocities by which loops may hold a contact off its surface
 HELD = 1e-10  # part of what moves a row without loops, below which it is rounding
@@ -32,6 +33,7 @@ class Seen:
         vd: (n,) acceleration without them.
         borne: (l, m) what their multipliers do to those of loops.
         own: (l,) these without them.
+        allowed: (m,) by how much a row may be off what it must do where rows depend on each other, m/s^2.
     """
 
     rows: list[int]
@@ -44,6 +46,7 @@ class Seen:
     vd: Floats
     borne: Floats
     own: Floats
+    allowed: Floats
 
     def part(self, rows: list[int]) -> Seen:
         """Only some of the rows."""
@@ -54,12 +57,12 @@ class Seen:
         G, X, (a, b) = self.G, self.X[..., keep], np.ix_(keep, keep)
         return Seen(
             rows, at, G[..., a, b], self.bare[..., keep], self.pull[..., keep], self.rate[..., keep], X, self.vd,
-            self.borne[..., keep], self.own,
+            self.borne[..., keep], self.own, self.allowed[..., keep],
         )  # fmt: skip
 
     def one(self, k: int) -> Seen:
         """Of several instants one."""
-        own = self.G, self.bare, self.pull, self.rate, self.X, self.vd, self.borne, self.own
+        own = self.G, self.bare, self.pull, self.rate, self.X, self.vd, self.borne, self.own, self.allowed
         return Seen(self.rows, self.at, *(x[k] for x in own))
 
 
@@ -69,6 +72,7 @@ class Sliding:
     Args:
         system: with rows that have friction.
         equations: of its run; its counter of evaluations goes on.
+        rtol: relative tolerance of the run.
 
     Attributes:
         ways: tangential rows of every contact with friction.
@@ -79,8 +83,8 @@ class Sliding:
         loops: rows that are always on.
     """
 
-    def __init__(self, system: System, equations: Equations) -> None:
-        self.equations, self.slow = equations, np.asarray(system.alpha)
+    def __init__(self, system: System, equations: Equations, rtol: float) -> None:
+        self.part, self.equations, self.slow = max(CONSISTENT, rtol), equations, np.asarray(system.alpha)
         self.mu, self.drift = np.asarray(system.friction), np.asarray(system.drift)
         first, count = np.asarray(system.tangent), np.asarray(system.tangents)
         self.ways = {i: list(range(first[i], first[i] + count[i])) for i in np.flatnonzero(count).tolist()}
@@ -126,14 +130,15 @@ class Sliding:
         vd, G = solved[..., :n, -1], H @ X
         slides = np.array([row in self.normal for row in rows], dtype=bool)
         bare = -(_times(H, vd) + Hdv) - np.where(slides, 0.0, law)
+        terms = np.abs(_times(H, vd)) + np.abs(Hdv) + np.abs(law)
+        moved = a0[:count] * np.abs(q).max() + a1[:count] * np.abs(v).max()
         if self.loops:
-            near = DRIFT * (a0[:count] * (1.0 + np.abs(q).max()) + a1[:count] * np.abs(v).max())
-            terms = np.abs(_times(H, vd)) + np.abs(Hdv) + np.abs(law)
+            near = DRIFT * (a0[:count] + moved)
             self._leave_held(M, H, G, bare, near + HELD * terms, rows)
         at = {row: k for k, row in enumerate(rows)}
         return Seen(
             rows, at, G, bare, np.where(slides, -law, 0.0), rate[..., :count], X, vd, solved[..., n:, :-1],
-            solved[..., n:, -1],
+            solved[..., n:, -1], self.part * terms + STATE * moved,
         )  # fmt: skip
 
     def _solved(self, M: Floats, f: Floats, H: Floats, asked: Floats, rows: list[int]) -> Floats:

@@ -95,7 +95,7 @@ def goes_on(scene: Any, found: Trajectory) -> bool:
     Sets that all but jam, as springs at all contacts alike would have it, do not count.
     """
     made = system(scene, case_of(scene).law)
-    rows, t = Sliding(made, e := Equations(made)), float(found.t[-1])
+    rows, t = Sliding(made, e := Equations(made), 1e-9), float(found.t[-1])
     q, v = found.q[-1].copy(), found.v[-1].copy()
     gap, rate = (a.copy() for a in e.gaps(t, q, v))
     closed = [i for i in rows.ways if gap[i] <= 1e-12 and (rate[i] < 0.0 or Mode(int(found.mode[-1][i])) in (6, 7))]

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from friction_obeyed import obeys
 from friction_oracle import consistent, tossed_rod
 from friction_scenes import (
     EDGED,
-    HEAVIEST,
     G,
-    account,
     box_on_floor,
     linear,
     piled,
@@ -24,17 +23,13 @@ from friction_scenes import (
 )
 
 from crossbody import cases, engines
-from crossbody.cases import InvalidValue, Mode, Outcome, SceneError, Trajectory
-from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import RowLaw, Scene
+from crossbody.cases import InvalidValue, Mode, Outcome, SceneError
+from crossbody.cases.scene import RowLaw
 from crossbody.cases.scene_contacts import PLACES
 from crossbody.reference import System, simulate
-from crossbody.reference.tree.system import system
 
 FURTHER = (1090, 1481, 2129, 2629)
 QUICK = (*range(60), 70, 147, 158, 210, 240, 264, 304, 325, 417, 499, 536, 572, *FURTHER)  # each broke some rule
-STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
-DRIFT = 1e3  # times rtol, of the largest speed: a contact that sticks is no faster
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -42,7 +37,7 @@ def test_cones_power_and_energy_of_tossed_bodies(seed: int) -> None:
     scene, q0, v0, mu = tossed(seed)
     run_ = run(scene, q0, v0, 0.5, rtol=1e-8)
     assert run_.outcome is Outcome.FINISHED, run_.message
-    obeys(scene, run_, mu, 1e-8)
+    assert obeys(scene, run_, mu, 1e-8) > 0 or mu == 0.0 or not run_.events or run_.outcome is Outcome.PAINLEVE
 
 
 @pytest.mark.parametrize(
@@ -53,7 +48,7 @@ def test_cones_power_and_energy_of_bodies_with_edges(seed: int) -> None:
     scene, q0, v0, mu = tossed(seed, EDGED, 1)
     run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=150_000)
     assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), run_.message
-    obeys(scene, run_, mu, 1e-6)
+    assert obeys(scene, run_, mu, 1e-6) > 0 or mu == 0.0 or not run_.events or run_.outcome is Outcome.PAINLEVE
 
 
 @pytest.mark.parametrize("size", [(0.1, 0.15, 0.0), (0.15, 0.02, 0.0)], ids=["can", "coin"])
@@ -63,7 +58,7 @@ def test_cones_power_and_energy_of_tossed_cans(seed: int, size: tuple[float, ...
     scene, q0, v0, mu = tossed(seed, {"cylinder": size}, 1)
     run_ = run(scene, q0, v0, 2.0, rtol=1e-6, max_steps=150_000)
     assert run_.outcome is Outcome.FINISHED, run_.message
-    obeys(scene, run_, mu, 1e-6)
+    assert obeys(scene, run_, mu, 1e-6) > 0 or mu == 0.0 or not run_.events or run_.outcome is Outcome.PAINLEVE
 
 
 @pytest.mark.parametrize("kinds", [types for types in PLACES if "plane" not in types], ids=":".join)
@@ -72,36 +67,7 @@ def test_cones_power_and_energy_of_piled_solids(seed: int, kinds: tuple[str, str
     scene, q0, v0, mu = piled(seed, kinds)
     run_ = run(scene, q0, v0, 0.8, rtol=1e-6, max_steps=150_000)
     assert run_.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), run_.message
-    obeys(scene, run_, mu, 1e-6)
-
-
-def obeys(scene: Scene, run_: Trajectory, mu: float, rtol: float) -> None:
-    """Check cones, the power of friction and what sticks at every row of a motion, and its account.
-
-    Rows at the instants of events belong to two sets of modes.
-    """
-    instants = {event.t for event in run_.events}
-    made = system(scene, case_of(scene).law)
-    follows, law, count = np.asarray(made.follows), np.asarray(made.a1), 0
-    for t, q, v, lam, mode in zip(run_.t, run_.q, run_.v, run_.lam, run_.mode, strict=True):
-        assert np.all(np.isfinite(lam))
-        if t in instants:
-            continue
-        rate = made.gap(q, v)[1]
-        for i in np.flatnonzero((mode == Mode.STICK) | (mode == Mode.SLIP)):
-            ways = np.flatnonzero(follows == i)
-            force, slip = lam[ways], rate[ways]
-            size = np.linalg.norm(slip)
-            assert mode[i] == Mode.SLIP or size < DRIFT * rtol * np.abs(run_.v).max()
-            pull = (
-                HEAVIEST * law[i] * size if mode[i] == Mode.STICK else 0.0
-            )  # what holds the drift down is no friction
-            assert np.linalg.norm(force) <= mu * max(lam[i], 0.0) * (1.0 + 1e-9) + 1e-9 + pull
-            if mode[i] == Mode.SLIP and size > STILL * rtol * np.abs(run_.v).max():
-                assert force @ slip == pytest.approx(-mu * lam[i] * size, rel=1e-9, abs=1e-12)
-                count += 1
-    assert account(run_) < 1e3 * rtol
-    assert count > 0 or mu == 0.0 or not run_.events
+    assert obeys(scene, run_, mu, 1e-6) > 0 or mu == 0.0 or not run_.events or run_.outcome is Outcome.PAINLEVE
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5, 6, 8])

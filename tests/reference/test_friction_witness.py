@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import account, linear, piled, random_problem, rod_on_floor, run, tossed
+from friction_scenes import account, drawn, linear, piled, random_problem, rod_on_floor, run, tossed
 
 from crossbody import cases, engines
 from crossbody.cases import Mode, Outcome, Tier, Trajectory
@@ -79,6 +79,17 @@ def test_both_machines_move_cans_and_solids_alike(make: Any, kinds: Any) -> None
     """They share the rows, and neither modes nor events."""
     one, _ = moved_alike(*(make(2, kinds, 1) if make is tossed else make(0, kinds)), t_end=0.3)
     assert len(one.events) > 1
+
+
+@pytest.mark.parametrize("seed", [10232, *(pytest.param(k, marks=pytest.mark.slow) for k in (10292, 10293, 20003))])
+def test_both_machines_part_rows_that_come_to_contradict_each_other(seed: int) -> None:
+    """Boxes in a row land on more corners than can all follow their laws; joints rub in two of them."""
+    scene, q0, v0, _, t_end = drawn(seed)
+    at = np.linspace(0.0, t_end, 41)
+    one = run(scene, q0, v0, t_end, rtol=1e-9, samples=at)
+    other = run(scene, q0, v0, t_end, rtol=1e-8, samples=at, solver="cvode")
+    assert one.outcome is other.outcome is Outcome.FINISHED, other.message
+    assert np.abs(one.q - other.q).max() < 1e-6
 
 
 @pytest.mark.parametrize("mu", [0.5, 2.0])

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Pair, Push, RowLaw, Scene, Shape, Tendon
+from crossbody.cases.scene_contacts import PLACES
 from crossbody.reference import System, kernels, simulate
 from crossbody.reference.tree.system import system
 
@@ -147,6 +148,50 @@ def piled(seed: int, kinds: tuple[str, str]) -> Any:
         pairs=(pair("floor", "up", mu, law), pair("floor", "low", mu, law), pair("up", "low", mu, law)),
     )  # fmt: skip
     return scene, np.array(q), np.array(v), mu
+
+
+def chained(seed: int, rng: np.random.Generator) -> Any:
+    """Return boxes in a row over a floor, joined by hinges and balls, some of which rub: up to 32 corners."""
+    count, size = int(rng.integers(2, 5)), (0.2, 0.15, 0.1)
+    bodies, joints, shapes, q = [], [], [Shape(name="floor", type="plane")], list[float]()
+    for i in range(count):
+        body = box_body(f"b{i}", size, float(rng.uniform(0.5, HEAVIEST)))
+        parent, place = (f"b{i - 1}", (0.45, 0.0, 0.0)) if i else ("", (0.0,) * 3)
+        bodies.append(dataclasses.replace(body, parent=parent, position=place))
+        kind = str(rng.choice(["ball", "hinge"])) if i else "free"
+        turn = np.array([1.0, 0.0, 0.0, 0.0]) + 0.15 * rng.normal(size=4)
+        turn /= np.linalg.norm(turn)
+        q += [0.0, 0.0, 0.2, *turn] if i == 0 else list(turn) if kind == "ball" else [0.15 * float(rng.normal())]
+        joints.append(Joint(
+            name=f"j{i}", body=body.name, type=kind, axis=(0, 1, 0), anchor=(-0.225, 0.0, 0.0) if i else (0.0,) * 3,
+            friction_loss=float(rng.choice([0.0, 0.3])) if i else 0.0,
+        ))  # fmt: skip
+        shapes.append(Shape(name=f"s{i}", body=body.name, type="box", size=size))
+    pairs = tuple(pair("floor", shape.name, 0.5) for shape in shapes[1:])
+    scene = Scene(bodies=tuple(bodies), joints=tuple(joints), shapes=tuple(shapes), pairs=pairs)
+    return scene, np.array(q), rng.normal(size=scene.nv), 0.5
+
+
+def drawn(seed: int) -> tuple[Scene, np.ndarray, np.ndarray, float, float]:
+    """Return bodies that are tossed, piled or joined, their start, mu from 0 to 2 and a horizon."""
+    rng = np.random.default_rng([seed, 77])
+    kind = int(rng.integers(0, 5))
+    if kind == 0:
+        made = tossed(seed)
+    elif kind == 1:
+        made = tossed(seed, EDGED, int(rng.integers(1, 4)))
+    elif kind == 2:
+        made = tossed(seed, {"cylinder": [(0.1, 0.15, 0.0), (0.15, 0.02, 0.0)][rng.integers(2)]}, 1)
+    elif kind == 3:
+        solids = [types for types in PLACES if "plane" not in types]
+        made = piled(seed, solids[rng.integers(len(solids))])
+    else:
+        made = chained(seed, rng)
+    scene, q, v, _ = made
+    mu = float(rng.choice([0.0, rng.uniform(0.0, 0.3), rng.uniform(0.3, 1.0), rng.uniform(1.0, 2.0)]))
+    law = RowLaw(a0=float(10 ** rng.uniform(3.0, 5.0)), a1=float(10 ** rng.uniform(0.5, 2.6)))
+    pairs = tuple(dataclasses.replace(one, friction=(mu, mu, 0.0, 0.0, 0.0), law=law) for one in scene.pairs)
+    return scene.replace(pairs=pairs), q, v, mu, (0.5, 0.8, 2.0, 0.8, 0.5)[kind]
 
 
 def tipped(seed: int) -> tuple[Scene, np.ndarray]:
