@@ -49,12 +49,17 @@ def show(rows: Sequence[Row], times: Times) -> None:
         click.echo("".join(f"{text}\n" for text in _absent(runs)), nl=False)
 
 
-def show_time(clock: Sequence[float], times: Times) -> None:
-    """Print where the time of the command went: from when runs, verdicts and pages began, and all ended, s.
+def show_time(clock: Sequence[float], times: Times, compiling: float = 0.0) -> None:
+    """Print where the time of the command went.
 
     Times of cases at once, or of an earlier attempt, are no parts of this time.
+
+    Args:
+        clock: when runs, verdicts and pages began, and all ended, s.
+        times: of the engines.
+        compiling: time that went into compiling, which is part of that of the runs, s.
     """
-    spent: dict[str, float] = {}
+    spent = {"compiling": compiling}
     for (_, who), (_, whole) in times.items():
         spent[who.partition(":")[0]] = spent.get(who.partition(":")[0], 0.0) + (whole or 0.0)
     runs, verdicts, pages = (later - earlier for earlier, later in pairwise(clock))
