@@ -91,6 +91,21 @@ def test_plots_have_lines(out: Path, browser: chromium.Browser) -> None:
     )
 
 
+def test_a_heat_map_has_a_colour_for_each_pair_of_its_axes(whole: Path, browser: chromium.Browser) -> None:
+    """What plotly is given as one row has colours on its diagonal alone."""
+    seen = 0
+    for name in ("analyse", "identify"):
+        browser.open(whole / f"{name}.html")
+        draw_all(browser)
+        tables = browser.js(
+            "[...document.querySelectorAll('.plot')].flatMap(({ data }) => data)"
+            ".filter(({ type }) => type === 'heatmap').map(({ x, y, z }) => [x.length, y.length, z.length, ...new Set([...z].map((row) => row.length))])"
+        )
+        assert all((z, *rows) == (y, x) for x, y, z, *rows in tables)
+        seen += len(tables)
+    assert seen >= 2
+
+
 def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browser) -> None:
     browser.open(out / CASE)
     browser.js("document.querySelector('.player').scrollIntoView()")

@@ -37,7 +37,7 @@ def commands(folder: Path) -> dict[str, tuple[str, ...]]:
     return {
         "gapmap": (*ONE, "--n", "3", "--points", "5"),
         "bode": ("soft_contact",),
-        "analyse": ("delta_impulse", "--at", "z=0.4", "--bode"),
+        "analyse": ("delta_impulse", "--at", "z=0.4", "--bode", "--map"),
         "stress": ("gap", *ONE, "--runs", "4", "--jobs", "1"),
         "replay": (*log, *ONE),
         "identify": (*log, "-f", "k1"),
