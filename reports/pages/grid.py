@@ -141,7 +141,7 @@ def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, floa
     costs = [_cost(walls.get(who), least) for who in engines]
     return [
         Line(text="all judged", small="error of position", cells=together),
-        Line(text="run time", small="over the least", cells=costs),
+        Line(text="run time", small="relative to the fastest", cells=costs),
         *_metrics(rows, mine, engines, page),
     ]
 

@@ -173,13 +173,13 @@ def _tiles(found: Results) -> dict[str, Any]:
         {"value": len(found.cases), "title": "cases", "word": ""},
         {
             "value": len({row["who"] for row in found.verdicts if row["engine"] != TRUTH}),
-            "title": "engines with profile",
+            "title": "engine profiles",
             "word": "",
         },
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if failed:
-        tiles.append({"value": failed, "title": "did not get the same physics", "word": Word.OUTSIDE.value})
+        tiles.append({"value": failed, "title": "failed parity audits", "word": Word.OUTSIDE.value})
     return {"tiles": tiles, "warnings": [text for text in (_version(found),) if text]}
 
 

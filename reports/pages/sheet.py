@@ -93,7 +93,7 @@ class Sheet:
 
     def _caption(self, drawn: Sequence[int]) -> str:
         empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
-        told = [f"Nothing to draw of: {', '.join(empty)}"] if empty else []
+        told = [f"Empty and left out: {', '.join(empty)}"] if empty else []
         told += [f"Off scale: {off_scale(self.far)}"] if self.far else []
         return ". ".join([self.title, *told])
 

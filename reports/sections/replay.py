@@ -24,7 +24,7 @@ METRICS = columns(
     verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 FINDINGS = columns(
-    what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)
+    what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Comment", Kind.LONG)
 )
 
 
