@@ -20,6 +20,10 @@ def line(ready: int, needed: int) -> None:
         sys.stderr.flush()
 
 
+def nothing(_ready: int, _needed: int) -> None:
+    """Leave the count untold."""
+
+
 class Count:
     """What this process knows to be needed and ready; functions go by their names with the module's before.
 
@@ -89,3 +93,8 @@ class Count:
 
 
 count = Count()
+
+
+def silence() -> None:
+    """Tell nothing from now on: another process does."""
+    count.show = nothing

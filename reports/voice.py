@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from crossbody.reference.compiling import count
+from crossbody.reference.compiling import count, nothing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +31,7 @@ def speaks(command: _Work) -> _Work:
         click.get_current_context().meta[_KEY] = {QUIET: quiet, JSON: as_json, OUT: sys.stdout}
         with (
             redirect_stdout(sys.stderr) if as_json else nullcontext(),  # what code of a user's own may print
-            count.shown(_nothing) if silent() else nullcontext(),
+            count.shown(nothing) if silent() else nullcontext(),
         ):
             return command(*args, **more)
 
@@ -44,10 +44,6 @@ def speaks(command: _Work) -> _Work:
         told = option(told)
     speaking: _Work = told
     return speaking
-
-
-def _nothing(_ready: int, _needed: int) -> None:
-    """Leave untold what is compiled."""
 
 
 def _told() -> Mapping[str, Any]:
