@@ -33,6 +33,7 @@ from crossbody.reports.pages.html import KeptTemplates, Page, file_name, plot
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
+from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 
 HOSTILE = "<script>alert(1)</script>"
@@ -99,6 +100,40 @@ def test_a_window_is_named_by_the_cases_and_the_verdict(out: Path, tmp_path: Pat
     assert title(out / "index.html") == title(out / CASE) == "bouncing_ball:linear: 1 outside · crossbody"
     many = made(tmp_path / "many", [], fake_rows(4))
     assert title(many / "index.html") == "case 0, case 1 and 2 more: all within · crossbody"
+
+
+def test_engines_that_did_not_run_have_no_column_on_the_page_of_the_case(out: Path) -> None:
+    def named(page: str) -> list[str]:
+        heads = [attrs["data-name"] for tag, attrs in Tags((out / page).read_text()).found if "data-name" in attrs]
+        return [name for name in heads if name and ":" in name]
+
+    assert f"fake:{HOSTILE}" in named(CASE)
+    assert "absent:*" not in named(CASE)
+    assert "absent:*" in named("index.html")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_left_before_an_event_does_not_stretch_the_plot_of_steps(seed: int, result: CaseResult) -> None:
+    """Steps of a collision are drawn; one in a thousand that is left over is not."""
+    draw = np.random.default_rng(seed)
+    lengths = 10.0 ** draw.uniform(-6.0, -3.0, 1000)
+    lengths[draw.integers(1000)] = 1e-16
+    truth = result.truth.trajectory
+    about = study.traces(result)[0].about | {"steps": [np.cumsum(lengths).tolist(), lengths.tolist()]}
+    low, high = figures.steps([Trace(about=about, run=truth)])["layout"]["yaxis"]["range"]
+    assert -7.0 < low < -5.0
+    assert -3.0 < high < -2.0
+
+
+def test_without_a_force_no_work_of_contacts_is_drawn(result: CaseResult) -> None:
+    trace = study.traces(result)[0]
+    assert trace.run.ledger is not None
+    still = replace(trace.run.ledger, contact=0.0 * trace.run.ledger.contact)
+    titles = [
+        figures.energy([replace(trace, run=replace(trace.run, ledger=ledger))])["layout"]["title"]["text"]
+        for ledger in (trace.run.ledger, still)
+    ]
+    assert ["work of contacts" in title for title in titles] == [False, True]
 
 
 def test_numbers_and_their_heads_end_at_the_same_side(out: Path) -> None:
