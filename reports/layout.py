@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from crossbody.reports.judging.verdict import unit_text
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -42,7 +44,7 @@ def laid_out(
     """Lay out a table.
 
     Args:
-        names: of the lines, which stay; cut where they take more than half the width.
+        names: of the lines, which stay; cut where they take more than half the width and columns need the room.
         cells: columns by their heads. Those that say nothing are left out.
         width: columns that no line exceeds.
         head: of the names.
@@ -53,13 +55,12 @@ def laid_out(
     cells = {one: column for one, column in cells.items() if set(column) - NOTHING}
     indent = "  " if above else ""
     lines = [indent + one for one in (head, *names)]
-    first = max(map(len, lines))
-    if first + _beside(cells) > width:
-        first = min(first, width // 2)
+    whole = max(map(len, lines))
+    first = whole if whole + _beside(cells) <= width else min(whole, width // 2)
     for one in [*left_out, *reversed([one for one in cells if one not in left_out])]:
         if first + _beside(cells) > width and len(cells) > 1:
             cells.pop(one, None)
-    first = min(first, max(width - _beside(cells), len(indent) + 1))
+    first = min(whole, max(width - _beside(cells), len(indent) + 1))
     lines = [_cut(line, first).ljust(first) for line in lines]
     for one, column in cells.items():
         texts = _aligned(one, column)
@@ -100,6 +101,8 @@ def frame(
         left_out: columns that go first.
     """
     texts = {str(one): [_text(value, digits) for value in rows[one]] for one in rows.columns}
+    if "unit" in texts:
+        texts["unit"] = [unit_text(unit, "{}") for unit in texts["unit"]]
     if {"engine", "profile"} <= set(texts):
         who = zip(texts["engine"], texts.pop("profile"), strict=True)
         texts["engine"] = [":".join(one) for one in who]

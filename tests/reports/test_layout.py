@@ -52,6 +52,10 @@ def test_no_line_is_too_wide_and_columns_go_in_order_and_whole(seed: int) -> Non
     told = shown(cells)
     kept = [head for head in told if head in first]
     assert first.split() == kept
+    beside = sum(2 + max(map(len, (head, *told[head]))) for head in kept)
+    assert all(
+        ("…" in line) == (len(name) > width - beside - 2 * bool(above)) for name, line in zip(names, body, strict=True)
+    )
     for i, line in enumerate(body):
         assert line.split()[1:] == [told[head][i] for head in kept]
     order = [head for head in (*left_out, *reversed([head for head in heads if head not in left_out])) if head in told]
@@ -82,17 +86,17 @@ def test_a_table_of_pandas_has_units_in_its_heads_and_names_engines_once() -> No
         {
             "case": ["a", "a", "b"], "engine": ["x", "y", "x"], "profile": ["p", "p", "q"],
             "median_ms": [1.5, np.nan, 2.0], "growth": [1.0, 2.0, 3.0], "ok": [True, False, True],
-            "empty": ["", "", ""],
+            "empty": ["", "", ""], "unit": ["1", "1", "m"],
         }
     )  # fmt: skip
     found = click.unstyle(layout.frame(rows, 80, heads={"growth": "growth [1/s]"}, above="case"))
     assert found == (
-        "  engine  median [ms]  growth [1/s]  ok\n"
+        "  engine  median [ms]  growth [1/s]  ok   unit\n"
         "a\n"
         "  x:p             1.5             1  yes\n"
         "  y:p               -             2  no\n"
         "b\n"
-        "  x:q               2             3  yes"
+        "  x:q               2             3  yes  m"
     )
 
 
