@@ -17,6 +17,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache, lru_cache
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
@@ -47,6 +48,19 @@ def fingerprint(function: Callable[..., Any]) -> str:
     walk = _Walk()
     walk.function(function)
     return walk.digest.hexdigest()
+
+
+def names_within(function: Callable[..., Any]) -> set[str]:
+    """Return the names, each behind its module's, of a function and of all compiled ones that it calls."""
+    walk = _Walk()
+    with suppress(Unreadable):  # what was met until then is known all the same
+        walk.function(function)
+    return {name_of(one.py_func) for one in walk.kept if isinstance(one, Dispatcher)} | {name_of(function)}
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """Return the name of a function behind that of its module."""
+    return f"{function.__module__}.{function.__name__}"
 
 
 class _Reads(NamedTuple):

@@ -6,11 +6,13 @@ import atexit
 import os
 import subprocess
 import sys
-from functools import cache
+from collections.abc import Iterable
+from functools import cache, partial
 from pkgutil import resolve_name
+from threading import Thread
 
 from crossbody.cases import UnknownName
-from crossbody.reference import code_store
+from crossbody.reference.compiling import count
 
 PIECES = {
     "integrator": "_program:program",
@@ -37,12 +39,39 @@ def begin() -> None:
 
     if _alone or not is_missing():
         return
-    code_store.tell(code_store.COMPILING)
+    count.need(_missing())
+    count.tell()
     if (os.cpu_count() or 1) < 2:
         return
-    work = f"from crossbody.reference.ahead import compile_piece\nfor name in {BESIDE!r}: compile_piece(name)"
-    none = subprocess.DEVNULL
-    atexit.register(_end, subprocess.Popen([sys.executable, "-c", work], stdin=none, stdout=none, stderr=none))
+    none, work = subprocess.DEVNULL, "from crossbody.reference import ahead; ahead.compile_beside()"
+    process = subprocess.Popen([sys.executable, "-c", work], stdin=none, stdout=subprocess.PIPE, stderr=none, text=True)
+    atexit.register(_end, process)
+    Thread(target=_follow, args=(process.stdout,), daemon=True).start()
+
+
+def _missing() -> set[str]:
+    """Names of the functions that `BESIDE` compiles, but for those of pieces that are kept."""
+    from crossbody.reference._fingerprint import names_within
+    from crossbody.reference._program import units
+    from crossbody.reference.cache import compiled
+    from crossbody.reference.sundials.compiled.evaluation import SIGNATURE, evaluate
+
+    needed = (*units(), (evaluate, SIGNATURE))
+    missing = (function for function, signature in needed if compiled(function, lazy=[signature]).lacks(signature))
+    return set[str]().union(*map(names_within, missing))
+
+
+def _follow(names: Iterable[str]) -> None:
+    """Count the functions that the other process has ready."""
+    for name in names:
+        count.done(name.rstrip("\n"))
+
+
+def compile_beside() -> None:
+    """Compile `BESIDE`, and print the name of each function that is ready, for the process that began this one."""
+    count.pass_on = partial(print, flush=True)
+    for name in BESIDE:
+        compile_piece(name)
 
 
 def meanwhile(name: str) -> None:
@@ -57,7 +86,7 @@ def meanwhile(name: str) -> None:
         compile_piece(name)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: subprocess.Popen[str]) -> None:
     process.terminate()
     process.wait()
 

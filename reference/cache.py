@@ -32,9 +32,10 @@ from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from crossbody.reference import ahead, code_store
-from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values
+from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values, name_of, names_within
 from crossbody.reference._hastened import hastened
 from crossbody.reference._parts import PartPasses, WholePasses, read_back
+from crossbody.reference.compiling import count
 
 _SETTINGS = (
     "BOUNDSCHECK", "OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DISABLE_INTEL_SVML", "ENABLE_AVX",
@@ -70,6 +71,7 @@ class Lean(CPUDispatcher):  # type: ignore[misc]
     def add_overload(self, cres: CompileResult) -> None:
         """Take what was compiled."""
         self.keep_count(cres)
+        count.done(name_of(self.py_func))
         super().add_overload(cres._replace(type_annotation=""))
 
     def keep_count(self, cres: CompileResult) -> None:
@@ -114,15 +116,21 @@ class Compiled(Lean):
             store = code_store.current() if name else None
             sig = self.declared.get(tuple(args), sig)
             if store is None:
-                with hastened():
+                with self._counted(), hastened():
                     return super().compile(sig)
             key = self._cache.key(name, sig)
             if store.has(key):
                 return super().compile(sig)
             if _home(self.py_func).startswith(OURS):
                 ahead.begin()
-            with store.alone(key), hastened():
+            with self._counted(), store.alone(key), hastened():
                 return super().compile(sig)
+
+    @contextmanager
+    def _counted(self) -> Iterator[None]:
+        count.need(names_within(self.py_func))
+        with count.clocked():
+            yield
 
     def lacks(self, sig: Any) -> bool:
         """Whether code for a signature would be kept, and is not yet."""
@@ -329,6 +337,7 @@ class Part(Lean):
     def add_overload(self, cres: CompileResult) -> None:
         """Take what was lowered: nothing that Python could call."""
         self.keep_count(cres)
+        count.done(name_of(self.py_func))
         entry = object()  # callers know the code by it
         cres.library.environment = (cres.fndesc.env_name, cres.environment)
         cres.library.finalize()

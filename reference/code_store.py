@@ -20,9 +20,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from threading import Timer
 
 from crossbody.cases.regular import open_regular
+from crossbody.reference.compiling import count
 
 try:
     import fcntl
@@ -35,7 +35,6 @@ CODE, LOCK = ".code", ".lock"
 OURS = re.compile(r"[\w.<>-]*-[0-9a-f]{32}\.(code|lock)|\.[\w.<>-]*\.part")
 UNUSED_DAYS, LARGEST = 90.0, 2 << 30  # what is kept, in days since it was last read and in bytes
 TELL_S, WAIT_S, LOOK_S = 2.0, 300.0, 0.05  # when a wait is told, when it ends, and how often it is looked, s
-SLOW_S = 6.0  # when a compilation is told: that of a kernel takes less
 _DAY = 86400.0
 
 
@@ -63,7 +62,6 @@ def base() -> Path | None:
         return None
 
 
-COMPILING = "compiling for this processor, once; it takes about half a minute."
 ADVICE = "Set CROSSBODY_CACHE to another folder."
 
 
@@ -187,11 +185,6 @@ class Store:
         """Let one process compile while others wait for its code, until it is there or `WAIT_S` have passed."""
         with ExitStack() as held:
             lock = self._lock(name, held) if fcntl is not None else None
-            if not self.has(name):
-                slow = Timer(SLOW_S, tell, [COMPILING])
-                slow.daemon = True  # a process that ends meanwhile does not wait for it
-                slow.start()
-                held.callback(slow.cancel)
             try:
                 yield
             finally:
@@ -217,7 +210,7 @@ class Store:
             if waited > WAIT_S:
                 tell(f"another process has held {path} for {waited:.0f} s; this one compiles for itself.")
                 return None
-            if waited > TELL_S and COMPILING not in _told:
+            if waited > TELL_S and not count.told:
                 tell("another process compiles what this one needs; waiting for it.")
             time.sleep(LOOK_S)
         return None

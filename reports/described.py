@@ -5,6 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from crossbody.reports import layout
+
 if TYPE_CHECKING:
     from crossbody.cases import Parameter
 
@@ -76,5 +78,6 @@ def text(told: Named) -> str:
     lines = []
     for title, named in told.items():
         width = max(map(len, named), default=0)
-        lines += [f"{title}:", *(f"  {name:<{width}}  {line}".rstrip() for name, line in named.items())]
+        all_ = (f"  {name:<{width}}  {line}".rstrip() for name, line in named.items())
+        lines += [f"{title}:", *(layout.told(line, indent=width + 4) for line in all_)]
     return "\n".join(lines)

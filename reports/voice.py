@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from crossbody.reference.compiling import count, nothing
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -27,7 +29,10 @@ def speaks(command: _Work) -> _Work:
     @wraps(command)
     def spoken(*args: Any, quiet: bool, as_json: bool, **more: Any) -> int:
         click.get_current_context().meta[_KEY] = {QUIET: quiet, JSON: as_json, OUT: sys.stdout}
-        with redirect_stdout(sys.stderr) if as_json else nullcontext():  # what code of a user's own may print
+        with (
+            redirect_stdout(sys.stderr) if as_json else nullcontext(),  # what code of a user's own may print
+            count.shown(nothing) if silent() else nullcontext(),
+        ):
             return command(*args, **more)
 
     options = (
@@ -118,18 +123,25 @@ def progress(steps: int | None, done: int | None = None) -> Iterator[Callable[[s
         return
     from rich import progress as shown
     from rich.console import Console
+    from rich.table import Column
 
+    words = Column(ratio=1, no_wrap=True, overflow="ellipsis")  # numbers are never cut, names may be
     columns = (
-        shown.BarColumn(), shown.MofNCompleteColumn(), shown.TimeElapsedColumn(), shown.TextColumn("left"),
-        shown.TimeRemainingColumn(), shown.TextColumn("{task.description}"),
+        shown.BarColumn(8), shown.MofNCompleteColumn(), shown.TimeElapsedColumn(), shown.TextColumn("left"),
+        shown.TimeRemainingColumn(), shown.TextColumn("{task.description}", table_column=words),
     )  # fmt: skip
-    with shown.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with shown.Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as bar:
         at = -1 if done is None else done
         task = bar.add_task("", total=steps, completed=max(at, 0))
+        compiling = bar.add_task("compiling for this processor, once", visible=False)
+
+        def show(ready: int, needed: int) -> None:
+            bar.update(compiling, total=needed, completed=ready, visible=ready < needed)
 
         def tell(text: str) -> None:
             nonlocal at
             at += 1
             bar.update(task, description=text, completed=at)
 
-        yield tell
+        with count.shown(show):
+            yield tell

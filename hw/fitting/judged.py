@@ -238,7 +238,7 @@ def _warnings(
         before, after = fit.before["rmse"][1], fit.after["rmse"][1]
         yield f"On windows that were not fitted the rmse grew from {before:.4g} to {after:.4g}: worse than the start."
     if few := [e.name for e in fit.estimates if np.isfinite(e.std) and e.freedom < EFFECTIVE]:
-        yield f"The intervals of {', '.join(few)} rest on few independent pieces of data: more windows would tell."
+        yield f"The intervals of {', '.join(few)} rest on few independent data; more windows would narrow them."
     if off > tolerance:
         yield f"Derivatives differ from central differences by {off:.1e}: judge the intervals by it."
     if not found.success:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import click
 import numpy as np
 import pandas as pd
 
 from crossbody import cases
 from crossbody.cases import InvalidValue
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 from crossbody.reports.analysis import bode as curves
 from crossbody.reports.analysis import numbers as work
 from crossbody.reports.analysis.counterparts import counterparts
@@ -22,14 +22,18 @@ from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.runs import choice, output
 from crossbody.reports.runs.provenance import provenance
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
 OMEGA = np.geomspace(1e-2, 1e4, 301)
 LOCUS_POINTS = 61
 PREFIX = "analysis-"  # how the names of the tables begin
 SHOWN = 40  # rows of a table that are printed
-BESIDE = ["place", "engine", "way", "slope", "poles", "verdict"]
+UNITS = {"real": "real [1/s]", "imag": "imag [rad/s]", "frequency": "frequency [rad/s]", "growth": "growth [1/s]"}
+BY = {
+    "ranks": {},
+    "poles": {"above": "place", "names": "led_by"},
+    "equilibria": {"above": "place", "names": "variable"},
+}
+"""How the lines of tables are named, and what stands above them."""
+BESIDE = ["place", "way", "slope", "poles", "verdict"]
 """Columns that are printed of the differences of engines."""
 
 
@@ -106,36 +110,25 @@ def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
     publish(out, "bode", tables, provenance(command))
     growths = curves.growths(tables["poles"])
     if not voice.told_as_json(tables | {"growths": growths}):
-        print_rows(growths)
+        print_rows(growths, heads=UNITS, above="mode")
         where(out)
     return 0
 
 
 def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
-    from rich.console import Console
-
-    console = Console()
     for key in ("equilibria", "poles", "ranks", "coefficients", "limits"):
         if not len(tables.get(key, ())):
             continue
-        console.print(_printed(f"{label}: {key}", tables[key].head(SHOWN), digits=6))
+        print_rows(tables[key].head(SHOWN), 6, f"{label}: {key}\n", heads=UNITS, **BY.get(key, {"above": "place"}))
         if len(tables[key]) > SHOWN:
-            console.print(f"... {len(tables[key]) - SHOWN} more rows; --out DIR keeps all.")
+            click.echo(f"... {len(tables[key]) - SHOWN} more rows; --out DIR keeps all.")
+        click.echo()
     for place, why in tables["refusals"].itertuples(index=False) if "refusals" in tables else ():
-        console.print(f"{place}: {why}")
+        click.echo(layout.told(f"{place}: {why}"))
     engines = tables["engines"]
-    console.print(_printed(f"{label}: differences of engines", engines[BESIDE].head(SHOWN), digits=2))
+    told = engines.assign(way=engines["engine"] + ": " + engines["way"])[BESIDE].head(SHOWN)
+    print_rows(told, 2, f"{label}: differences of engines\n", above="place")
     for why in engines["why"].dropna().unique():
         if why:
-            console.print(f"{', '.join(engines.loc[engines['why'] == why, 'engine'].unique())}: {why}")
-
-
-def _printed(title: str, rows: pd.DataFrame, digits: int) -> Table:
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left")
-    for column in rows.columns:
-        table.add_column(column, justify="right" if pd.api.types.is_numeric_dtype(rows[column]) else "left")
-    for record in rows.itertuples(index=False):
-        table.add_row(*(f"{x:.{digits}g}" if isinstance(x, float) else str(x) for x in record))
-    return table
+            who = ", ".join(engines.loc[engines["why"] == why, "engine"].unique())
+            click.echo(layout.told(f"{who}: {why}"))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import click
 import pandas as pd
 from pyarrow import ArrowException
 
 from crossbody.cases import CrossbodyError, InvalidValue, OutputError
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
-from crossbody.reports.commands.shared import identity, key, publish, where
+from crossbody.reports.commands.shared import identity, key, print_rows, publish, where
 from crossbody.reports.runs import choice, files, output
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
@@ -22,12 +23,14 @@ from crossbody.reports.runs.watch import LIMIT
 from crossbody.reports.voice import progress
 
 SHOWN = {
-    "bench": ["case", "engine", "profile", "knob", "setting", "error", "honesty", "error_between", "median_ms",
-              "iqr_ms", "call_ms", "native_ms", "control_ms", "outcome"],
+    "bench": ["case", "engine", "profile", "knob", "setting", "error", "median_ms", "call_ms", "native_ms", "honesty",
+              "error_between", "iqr_ms", "control_ms", "outcome"],
     "orders": ["case", "engine", "profile", "knob", "order", "promised", "says"],
-    "headline": ["case", "engine", "profile", "tier", "best_error", "engine_ms", "reference_ms", "ratio",
-                 "ratio_native", "least_ratio", "ahead", "says"],
+    "headline": ["case", "engine", "profile", "best_error", "engine_ms", "reference_ms", "ratio", "ratio_native",
+                 "least_ratio", "ahead", "tier", "says"],
 }  # fmt: skip
+"""Columns that are printed; where they are too wide the last ones go."""
+UNSAID = {"", "converges"}  # what is said of a row as a rule
 
 
 def run(
@@ -73,16 +76,29 @@ def _part(path: Path) -> pd.DataFrame:
 def show(tables: Mapping[str, pd.DataFrame], out: Path) -> None:
     """The tables in the terminal, and where the page is."""
     for name, table in tables.items() if not voice.told_as_json(tables) and not voice.quiet() else ():
-        print(f"\n{name}")
         shown = table[SHOWN[name]] if name in SHOWN else table
-        print(shown.to_string(index=False, float_format=lambda x: "-" if math.isnan(x) else f"{x:.3g}"))
+        above = "case" if "case" in shown else ""
+        print_rows(shown.drop(columns="says", errors="ignore"), digits=3, title=f"\n{name}\n", above=above)
+        for sentence in _said(shown):
+            click.echo(layout.told(sentence))
     where(out)
+
+
+def _said(rows: pd.DataFrame) -> Iterator[str]:
+    """What a table says of some of its rows, once for all of an engine."""
+    if "says" not in rows:
+        return
+    for says in (says for says in rows["says"].unique() if says not in UNSAID):
+        own = rows[rows["says"] == says]
+        who = own["case"] + " " + own["engine"] + ":" + own["profile"]
+        yield f"{', '.join(who)}: {says.removesuffix('.')}."
 
 
 def tell_losses(losses: pd.DataFrame, against: Path | None) -> int:
     """Every loss with its reason; 1 if there is one."""
     for loss in losses.to_dict(orient="records") if not voice.as_json() else ():
-        print(f"lost {loss['what']}: {loss['case']} {loss['engine']}:{loss['profile']}: {loss['why']}.")
+        run = f"{loss['case']} {loss['engine']}:{loss['profile']}"
+        click.echo(layout.told(f"lost {loss['what']}: {run}: {loss['why']}."))
     if not voice.silent():
         print(f"Against {against}: {len(losses)} lost.")
     return int(len(losses) > 0)
@@ -95,7 +111,7 @@ def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequen
     publish(out, name, {name: rows}, provenance(command))
     show({name: rows}, out)
     for line in failed if not voice.as_json() else ():
-        print(f"outside: {line}")
+        click.echo(layout.told(f"outside: {line}"))
     return int(bool(failed))
 
 

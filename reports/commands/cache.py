@@ -14,6 +14,7 @@ import click
 from crossbody import cases, engines
 from crossbody.cases import OutputError
 from crossbody.reference import ahead, code_store
+from crossbody.reference.compiling import silence
 from crossbody.reports import voice
 
 
@@ -21,12 +22,17 @@ def warm() -> int:
     """Compile what is the same for all mechanisms, then the kernels of every case; the exit code."""
     began = time.perf_counter()
     steps = len(ahead.PIECES) + len(cases.names())
-    with voice.progress(steps) as tell, ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+    with voice.progress(steps) as tell, _processes() as pool:
         _each(pool, ahead.compile_piece, tuple(ahead.PIECES), tell)
         _each(pool, compile_case, cases.names(), tell)
     if not voice.silent():
         click.echo(f"Compiled in {time.perf_counter() - began:.0f} s; kept in {code_store.base()}.")
     return 0
+
+
+def _processes() -> ProcessPoolExecutor:
+    """As many as there are processors, which leave it to this one to say how far they are."""
+    return ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), initializer=silence)
 
 
 def _each(

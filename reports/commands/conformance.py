@@ -13,7 +13,7 @@ import pandas as pd
 from crossbody.cases import EngineUnavailable, UnknownName
 from crossbody.cases.files.conformance import FEATURES
 from crossbody.engines import importers
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 from crossbody.reports.commands.shared import publish, where
 from crossbody.reports.importers.compare import FAILED, OK, UNSEEN, UNSUPPORTED, WRONG
 from crossbody.reports.importers.conformance import table
@@ -57,7 +57,7 @@ def _show(rows: pd.DataFrame, absent: dict[str, str], out: Path) -> None:
             told = ", ".join(
                 f"{counts[word]} {word}" for word in (OK, WRONG, UNSUPPORTED, UNSEEN, FAILED) if counts[word]
             )
-            print(f"{engine} {version}: {told}")
+            print(layout.told(f"{engine} {version}: {told}"))
         if absent:
-            print(importers.missing(sorted(absent)))
+            print(layout.told(importers.missing(sorted(absent))))
     where(out)

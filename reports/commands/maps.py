@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import click
+
 from crossbody import engines
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.maps import gapmap, stability
 from crossbody.reports.runs import choice, output
@@ -24,9 +26,10 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
     publish(out, "gapmap", {"gapmap": rows}, provenance(command, points=points))
     lines = gapmap.summary(rows)
     if not voice.told_as_json({"gapmap": rows, "summary": lines}):
-        print_rows(lines.drop(columns="why"))
+        print_rows(lines.drop(columns="why"), heads={"at_s": "at s", "n": "balls"})
         for line in lines[lines["why"] != ""].to_dict(orient="records"):
-            print(f"{line['n']} balls, {line['engine']}:{line['profile']}, {line['machine']}: {line['why']}")
+            run = f"{line['n']} balls, {line['engine']}:{line['profile']}, {line['machine']}"
+            click.echo(layout.told(f"{run}: {line['why']}"))
         where(out)
     return 0
 
@@ -42,6 +45,7 @@ def stability_map(wanted: Sequence[str], out: Path, command: str) -> int:
     if not voice.told_as_json({"stability": rows, "surprises": surprises}):
         print_rows(rows.drop(columns=["change", "why"]))
         for row in surprises.to_dict(orient="records"):
-            print(f"outside: {row['engine']}:{row['profile']} {row['scene']}: {row['expected']} expected. {row['why']}")
+            run = f"{row['engine']}:{row['profile']} {row['scene']}"
+            click.echo(layout.told(f"outside: {run}: {row['expected']} expected. {row['why']}"))
         where(out)
     return int(len(surprises) > 0)

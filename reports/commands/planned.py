@@ -9,6 +9,7 @@ import click
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Value
+from crossbody.reports import layout
 from crossbody.reports.judging.stored import words
 from crossbody.reports.runs import choice
 
@@ -23,13 +24,14 @@ def tell(
     for case in cases:
         parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
         click.echo(f"{case.label}: {len(case.v0)} velocities, {len(case.contacts)} rows, {case.t_end:g} s")
-        click.echo(f"  parameters: {parameters}" if parameters else "  no parameters")
+        click.echo(layout.told(f"  parameters: {parameters}") if parameters else "  no parameters")
         known: list[tuple[str, str, Mapping[str, Any]]] = []
         for pick in (choice.of_case(one, case) for one in picks):
             told = _settings(case, pick, asked)
             if not isinstance(told, str):
                 known.append((pick.engine, pick.profile, told))
-            click.echo(f"  {pick.engine}:{pick.profile}  {told if isinstance(told, str) else words(told)}".rstrip())
+            line = f"  {pick.engine}:{pick.profile}  {told if isinstance(told, str) else words(told)}"
+            click.echo(layout.told(line.rstrip()))
         choice.check_known(asked, known)
     return 0
 

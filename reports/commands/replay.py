@@ -8,13 +8,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import click
 import pandas as pd
 
 from crossbody import hw
 from crossbody.cases import CaseUnsupported
 from crossbody.hw import Comparison, Fit, Log
-from crossbody.reports import voice
-from crossbody.reports.commands.shared import identity, where
+from crossbody.reports import layout, voice
+from crossbody.reports.commands.shared import identity, print_rows, where
 from crossbody.reports.figures.section import records
 from crossbody.reports.judging.verdict import Word, exit_code, unit_text
 from crossbody.reports.pages import site as page
@@ -27,6 +28,19 @@ from crossbody.reports.runs.provenance import provenance
 
 GRACE = 2.0
 """Times the limit on an identification after which its process is ended: it stops itself between runs."""
+HEADS = {"change": "change [%]"}
+SPARED = (
+    "kept_low",
+    "kept_high",
+    "first_half",
+    "second_half",
+    "freedom",
+    "std",
+    "start",
+    "identifiable",
+    "fitted_before",
+)
+"""Columns that go first where a table is too wide."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,10 +163,11 @@ def run_identify(
     if not voice.told_as_json(tables | more):
         if not voice.quiet():
             for shown in tables.values():
-                print(shown.to_string(index=False, float_format=lambda x: f"{x:.6g}"), end="\n\n")
-            print(f"{fit.sensitivities}\nIntervals: {fit.covariance}")
+                print_rows(shown, 6, heads=HEADS, left_out=SPARED)
+                click.echo()
+            click.echo(f"{layout.told(fit.sensitivities)}\n{layout.told(f'Intervals: {fit.covariance}')}")
         for warning in fit.warnings:
-            print(f"warning: {warning}")
+            click.echo(layout.told(f"warning: {warning}"))
         _say_outside(rows)
         where(out)
     return exit_code(rows["verdict"]) if fit.success else 1
@@ -206,19 +221,21 @@ def _say_outside(rows: pd.DataFrame) -> None:
         best, most = row["expected"], row["limit"]
         bound = f"valid: at least {best - most:.6g}" if best else f"limit {most:.4g}"
         who, value = f"{row['engine']}:{row['profile']}", f"{row['value']:.4g}{unit_text(row['unit'])}"
-        print(f"outside: {who} {row['metric']} is {value}, {bound}. {row['why']}")
+        click.echo(layout.told(f"outside: {who} {row['metric']} is {value}, {bound}. {row['why']}"))
 
 
 def _say(found: Comparison, metrics: pd.DataFrame) -> None:
-    print(f"{replay.tier(found.log)}: {found.log.provenance.file} on {found.model}, {len(found.windows)} windows")
+    source = f"{replay.tier(found.log)}: {found.log.provenance.file}"
+    click.echo(layout.told(f"{source} on {found.model}, {len(found.windows)} windows"))
     for finding in found.log.findings:
-        print(f"note: {finding.channel}, row {finding.row}: {finding.text}")
+        click.echo(layout.told(f"note: {finding.channel}, row {finding.row}: {finding.text}"))
     units = metrics["unit"].map(lambda unit: unit_text(unit, " [{}]"))
     name = (metrics["metric"] + " " + metrics["channel"]).str.strip() + units
     wide = metrics.assign(metric=name).pivot(index="metric", columns="who", values="value").loc[name.unique()]
-    print(wide.rename_axis(index=None, columns=None).to_string(float_format=lambda x: f"{x:.5g}"))
+    cells = {who: [f"{value:.5g}" for value in wide[who]] for who in wide.columns}
+    click.echo(layout.split(list(wide.index), cells, layout.columns()))
     for (engine, profile), why in found.skipped.items():
-        print(f"skipped {engine}:{profile}: {why}")
+        click.echo(layout.told(f"skipped {engine}:{profile}: {why}"))
 
 
 def _write(

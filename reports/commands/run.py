@@ -12,6 +12,7 @@ import click
 
 from crossbody.cases import Case, InvalidValue, installed
 from crossbody.cases.loading import OF_USERS, parted
+from crossbody.reference.compiling import count
 from crossbody.reports import voice
 from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
@@ -50,7 +51,7 @@ def run(
     output.check(out, "run")
     site.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
-    clock = [perf_counter()]
+    clock, compiled = [perf_counter()], count.seconds
     decides = identity("run", cases, names, picks=picks, rtol=rtol, settings=asked, budget=budget)
     with Parts(out, command, decides) as parts:
 
@@ -77,7 +78,7 @@ def run(
     if untold is not None:
         raise untold
     if not voice.silent():
-        show_time([*clock, perf_counter()], results.times_of(out))
+        show_time([*clock, perf_counter()], results.times_of(out), count.seconds - compiled)
     where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))

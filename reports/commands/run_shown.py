@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-import shutil
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import click
 
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, runs_of, sentence
 from crossbody.reports.judging.verdict import Regression, Row, Word, unit_text
 from crossbody.reports.pages import html
 from crossbody.reports.pages.results import Times
 
-WIDTH = 120  # of the table in a file or a pipe
 MANY = 4  # cases that are named of those that an engine could not run
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
@@ -37,24 +34,30 @@ def show(rows: Sequence[Row], times: Times) -> None:
     """Print who is off and by how much, a line a run, every row that is wrong, and what could not run."""
     runs = runs_of(rows)
     if not voice.quiet():
-        width = shutil.get_terminal_size().columns if sys.stdout.isatty() else WIDTH
-        click.echo(f"{sentence(runs)}\n\n{table(runs, times, width)}\n\n{counted(rows)}")
+        shown = table(runs, times, layout.columns())
+        click.echo(f"{layout.told(sentence(runs))}\n\n{shown}\n\n{counted(rows)}")
     for run in runs:
         for row in run.wrong:
-            click.echo(_wrong(run, row))
+            click.echo(layout.told(_wrong(run, row)))
     for run in runs:
         for row in (row for row in run.rows if row["regression"] == Regression.LOST):
-            click.echo(_lost(run, row))
+            click.echo(layout.told(_lost(run, row)))
     if not voice.quiet():
-        click.echo("".join(f"{text}\n" for text in _absent(runs)), nl=False)
+        for text in _absent(runs):
+            click.echo(layout.told(text))
 
 
-def show_time(clock: Sequence[float], times: Times) -> None:
-    """Print where the time of the command went: from when runs, verdicts and pages began, and all ended, s.
+def show_time(clock: Sequence[float], times: Times, compiling: float = 0.0) -> None:
+    """Print where the time of the command went.
 
     Times of cases at once, or of an earlier attempt, are no parts of this time.
+
+    Args:
+        clock: when runs, verdicts and pages began, and all ended, s.
+        times: of the engines.
+        compiling: time that went into compiling, which is part of that of the runs, s.
     """
-    spent: dict[str, float] = {}
+    spent = {"compiling": compiling}
     for (_, who), (_, whole) in times.items():
         spent[who.partition(":")[0]] = spent.get(who.partition(":")[0], 0.0) + (whole or 0.0)
     runs, verdicts, pages = (later - earlier for earlier, later in pairwise(clock))
@@ -64,7 +67,7 @@ def show_time(clock: Sequence[float], times: Times) -> None:
     rest = runs - sum(spent.values())
     told = f" ({', '.join([*parts, f'truths {rest:.1f}'])})" if parts and rest >= 0.0 else ""
     total = clock[-1] - clock[0]
-    click.echo(f"Time: {total:.1f} s: runs {runs:.1f}{told}, verdicts {verdicts:.1f}, pages {pages:.1f}")
+    click.echo(layout.told(f"Time: {total:.1f} s: runs {runs:.1f}{told}, verdicts {verdicts:.1f}, pages {pages:.1f}"))
 
 
 def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
@@ -77,29 +80,10 @@ def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
     for name, word in (("within", Word.WITHIN), ("known", Word.EXPECTED), ("outside", Word.OUTSIDE)):
         columns[name] = [str(sum(row["verdict"] == word for row in run.rows)) for run in runs]
     columns = {name: cells for name, cells in columns.items() if name == "outside" or set(cells) - EMPTY}
-    first = max((len(run.who) for run in runs), default=0) + 2
-    for name in LEFT_OUT:
-        if first + sum(2 + _wide(head, cells) for head, cells in columns.items()) <= width:
-            break
-        columns.pop(name, None)
-    lines = [" " * first + "".join(f"  {head:>{_wide(head, cells)}}" for head, cells in columns.items())]
-    for i, run in enumerate(runs):
-        if i == 0 or run.label != runs[i - 1].label:
-            lines.append(click.style(run.label, bold=True))
-        lines.append(
-            f"  {run.who.removesuffix(':'):<{first - 2}}"
-            + "".join(_cell(head, cells, i) for head, cells in columns.items())
-        )
-    return "\n".join(lines)
-
-
-def _wide(head: str, cells: Sequence[str]) -> int:
-    return max(map(len, (head, *cells)))
-
-
-def _cell(head: str, cells: Sequence[str], i: int) -> str:
-    text = f"{cells[i]:>{_wide(head, cells)}}"
-    return "  " + (click.style(text, fg=COLOURS[head]) if head in COLOURS and cells[i] != "0" else text)
+    return layout.laid_out(
+        [run.who.removesuffix(":") for run in runs], columns, width, above=[run.label for run in runs],
+        left_out=LEFT_OUT, colours=COLOURS,
+    )  # fmt: skip
 
 
 def _error(run: EngineRun, metric: str) -> str:

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
+
 from crossbody.cases import Case, installed
 from crossbody.cases.loading import OF_USERS, parted
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 from crossbody.reports.pages import site
 from crossbody.reports.runs import output, study
 from crossbody.reports.runs.provenance import code
@@ -46,10 +48,10 @@ def publish(out: Path, name: str, tables: Mapping[str, pd.DataFrame], told: Mapp
         site.write(made)
 
 
-def print_rows(rows: pd.DataFrame, digits: int = 4) -> None:
-    """Print a table, unless nothing but what is wrong is to be said."""
-    if not voice.quiet():
-        print(rows.to_string(index=False, float_format=lambda x: f"{x:.{digits}g}"))
+def print_rows(rows: pd.DataFrame, digits: int = 4, title: str = "", **how: Any) -> None:
+    """Print a table as `layout.frame` lays it out, unless nothing but what is wrong is to be said."""
+    if not voice.quiet() and len(rows):
+        click.echo(title + layout.frame(rows, layout.columns(), digits=digits, **how))
 
 
 def where(out: Path) -> None:

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import click
 import pandas as pd
 
 from crossbody.cases import InvalidValue, OutputError
-from crossbody.reports import suites, voice
+from crossbody.reports import layout, suites, voice
 from crossbody.reports.commands.shared import print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.runs import choice, watch
@@ -128,12 +129,12 @@ def _executed(left: Sequence[pools.Chunk], pool: Pool) -> Iterable[tuple[int, po
 
 def _show(rows: pd.DataFrame, small: pd.DataFrame, out: Path) -> None:
     """One line a suite and engine, the reproducers, and where the page is."""
-    print_rows(summary(rows), digits=2)
+    print_rows(summary(rows), digits=2, above="suite", left_out=("with_truth", "not_run", "worst_residual"))
     if not voice.quiet():
-        print(f"{len(rows)} runs, {len(failures(rows))} ended before their horizon or are outside")
+        click.echo(f"{len(rows)} runs, {len(failures(rows))} ended before their horizon or are outside")
     for line in small.head(SHOWN).to_dict(orient="records"):
-        print(f"{line['verdict']}: {line['outcome']} ({line['count']}x): {line['command']}")
-        print(f"    {line['why'][:300]}")
+        click.echo(f"{line['verdict']}: {line['outcome']} ({line['count']}x): {line['command']}")
+        click.echo(layout.told(f"    {line['why'][:300]}"))
     if len(small) > SHOWN:
         print(f"and {len(small) - SHOWN} more kinds in {out / 'reproducers.csv'}")
     where(out)

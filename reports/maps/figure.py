@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES, Panels
+from crossbody.reports.figures.styles import COLOURS, DASHES, Panels, plain
 from crossbody.reports.maps.gapmap import PATTERN
 
 FAILED = {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": "crimson"}}
@@ -54,7 +54,7 @@ def _traces(group: pd.DataFrame, column: str, name: str, style: int, legend: boo
 
 
 ENDS = (("arrived", "in the centre", "circle", COLOURS[2]), ("lost", "not there at the end", "x", COLOURS[3]))
-LINE = 17  # height of one scene, pixels
+LINE, LABEL = 17, 48  # height of one scene, pixels, and the characters of its label, which leave the plot its room
 
 
 def stability(rows: pd.DataFrame) -> Figure:
@@ -64,6 +64,7 @@ def stability(rows: pd.DataFrame) -> Figure:
     several = drawn["engine"].nunique() > 1
     labels = drawn["engine"] + ": " + names if several else names
     arrived = drawn["arrived"].astype(bool)
+    short = [plain(label if len(label) <= LABEL else label[: LABEL - 1] + "…") for label in labels]
     panels = Panels("Stability map of the ball maze", 180 + LINE * len(drawn))
     for key, name, symbol, colour in ENDS:
         shown = arrived if key == "arrived" else ~arrived
@@ -73,9 +74,17 @@ def stability(rows: pd.DataFrame) -> Figure:
             marker={"symbol": symbol, "size": 9, "color": colour},
             text="expected: " + drawn["expected"][shown], hoverinfo="x+y+text",
         )  # fmt: skip
-    panels.axes("x", title="arrival in the centre, or end of the run [s]")
-    panels.axes("y", categoryorder="array", categoryarray=labels.tolist(), automargin=True)
-    return panels.figure()
+    panels.axes("x", title="arrival, or end of the run [s]")
+    panels.axes(
+        "y",
+        categoryorder="array",
+        categoryarray=labels.tolist(),
+        automargin=True,
+        tickvals=labels.tolist(),
+        ticktext=short,
+        range=[-0.7, len(short) - 0.3],
+    )
+    return panels.figure(legend={"orientation": "h", "y": 1.0, "yanchor": "bottom"})
 
 
 BEST, WORST = -12.0, 2.0  # decades of error that the colours tell apart
@@ -89,7 +98,9 @@ def stress_map(cells: pd.DataFrame) -> Figure:
     rows = max(-(-len(groups) // 2), 1)
     titles = [f"{engine}:{profile}" for (engine, profile, _), _ in groups]
     title, height = "Stability map: largest error over damping ratios 0 to 10", 120 + FIELD * rows
-    panels = Panels(title, height, rows=rows, cols=2, gap=0.4 / rows, heads=titles, shared=False)
+    panels = Panels(
+        title, height, rows=rows, cols=min(max(len(groups), 1), 2), gap=0.4 / rows, heads=titles, shared=False
+    )
     for i, ((_, _, knob), group) in enumerate(groups):
         row, column = i // 2 + 1, i % 2 + 1
         panels.add(row, column, **_field(group, i == 0))

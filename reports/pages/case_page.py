@@ -45,7 +45,7 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     """All sections of one case, with a share of the usual room; its motions are forgotten with the page."""
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
-        name=case.page, title=case.label, lead=_lead(case.about),
+        name=case.page, title=case.label, lead=_lead(case.about), word=grid.verdict(rows),
         engines=[{"name": label(trace), **style(trace, i)} for i, trace in enumerate(traces)],
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
@@ -75,7 +75,7 @@ def _glance(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="glance", title="At a glance", template="matrix.html",
         context={
-            "corner": "Metric", "heads": grid.heads(grid.names(rows)), "wide": True, "filtered": False,
+            "corner": "Metric", "heads": grid.heads(grid.ran(rows)), "wide": True, "filtered": False,
             "pages": (), "lines": grid.of_case(rows, case.page, case.label, _walls(found, case)),
             "says": "A cell leads to its limit, its reason and the command that repeats it.",
         },

@@ -26,6 +26,10 @@ MOST_SIGNALS = 9
 BEYOND = 1.5  # times the truth's largest force up to which forces are drawn
 NAMED = 6
 """Contacts without a force that are named; a robot has hundreds."""
+IDLE = 1e-9
+"""Part of the largest force of a case, or of the force that its energy makes over its way, below which
+a contact carries none: tolerances of runs and rounding leave that."""
+REMAINDERS = 0.02  # share of the steps that may be what is left before an event, or a first try: not drawn
 ROUNDING = 1e-17  # depth below which there is none, m
 
 
@@ -129,7 +133,8 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
         ends, far = robust(traces, k)
         if ends is not None:
             sheet.clip(3 * place, *ends)
-            sheet.say(f"{contacts[k]}, {far}")
+            for who, size in far.items():
+                sheet.beyond(who, size, force_unit(traces, k), contacts[k])
         for limit, name in limits.get("lam_impulse_path", {}).items():
             sheet.limit(3 * place + 2, limit * float(np.nanmax(np.abs(summed[0]), initial=0.0)), name)
     sheet.logarithmic(*range(2, len(rows), 3))
@@ -142,23 +147,26 @@ def force_unit(traces: Sequence[Trace], k: int) -> str:
 
 
 def carrying(traces: Sequence[Trace]) -> list[int]:
-    """Contacts that carry a force in any motion."""
-    return sorted(
-        {int(k) for trace in traces for k in np.flatnonzero((np.nan_to_num(trace.run.lam) != 0.0).any(axis=0))}
-    )
+    """Contacts that carry a force in any motion, more than rounding."""
+    lam = [np.abs(np.nan_to_num(trace.run.lam)).max(axis=0, initial=0.0) for trace in traces]
+    largest = np.max(lam, axis=0, initial=0.0)
+    way = max(traces[0].about.get("scales", ()), default=0.0) or 1.0
+    usual = max(float(np.max(largest, initial=0.0)), energy_of(traces[0].run) / way)
+    return [int(k) for k in np.flatnonzero(largest > IDLE * usual)]
 
 
-def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, str]:
-    """Return the ends of a plot of a contact's force where runs go far beyond the truth's, and which."""
-    ends = {label(trace): (np.nanmin(lam), np.nanmax(lam)) for trace in traces
-            if np.isfinite(lam := trace.run.lam[:, k]).any()}  # fmt: skip
+def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, dict[str, float]]:
+    """Return the ends of a plot of a contact's force where runs go far beyond the truth's, and how far which do."""
+    ends = {
+        label(trace): (float(np.nanmin(lam)), float(np.nanmax(lam))) for trace in traces
+        if np.isfinite(lam := trace.run.lam[:, k]).any()
+    }  # fmt: skip
     low, high = ends.get(TRUTH, (0.0, 0.0))
     reach = max(high, -low)
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
     if not far or reach == 0.0:
-        return None, ""
-    told = ", ".join(f"{who} reaches {size:.2g} {force_unit(traces, k)}" for who, size in far.items())
-    return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), told
+        return None, {}
+    return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), far
 
 
 def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
@@ -172,7 +180,8 @@ def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
         if run.ledger is None:
             continue
         work = run.ledger.contact.sum(axis=1)
-        sheet.line(trace, i, 1, work)
+        if work.any():
+            sheet.line(trace, i, 1, work)
         book = work + run.ledger.input - run.ledger.dissipated
         sheet.line(trace, i, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor))
     sheet.logarithmic(2)
@@ -204,11 +213,14 @@ def penetration(traces: Sequence[Trace], points: int = POINTS, limits: Limits = 
 def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
     """Length of every step at its start: small while a collision lasts, large again when it is over."""
     sheet = Sheet(["step size\n[s]"], "Step size of each engine", points)
-    floor = floor_of(traces[0].run.t)
+    floor, usual = floor_of(traces[0].run.t), list[Floats]()
     for i, trace in enumerate(traces):
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
         sheet.line(trace, i, 0, np.maximum(lengths, floor), starts, shape="hv")
+        usual += [np.quantile(lengths, (REMAINDERS, 1.0))] if len(lengths) else []
     sheet.logarithmic(0)
+    if usual:
+        sheet.clip(0, 0.3 * float(np.min(usual)), 3.0 * float(np.max(usual)))
     return sheet.done()
 
 

@@ -14,6 +14,7 @@ from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import LEVEL, coded, label, plain, style
 from crossbody.reports.pages.figures import force_unit, robust
+from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 from crossbody.reports.scenes.scene import slip
@@ -44,8 +45,9 @@ def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     lines = [line for i, trace in enumerate(traces) if (line := _over_depth(trace, i, k, int(share * MOST_OF_DEPTH)))]
     name = traces[0].about["contacts"][k]
     ends, far = robust(traces, k)
-    title = f"Force over depth, contact {plain(name)}{far and f'. Off scale: {far}'}"
     unit = force_unit(traces, k)
+    off = off_scale({who: [(size, unit, name)] for who, size in far.items()})
+    title = f"Force over depth, contact {plain(name)}{off and f'. Off scale: {plain(off)}'}"
     layout = {
         "title": {"text": title}, "height": 420, "showlegend": False,
         "xaxis": {"title": {"text": f"depth [{'m' if unit == 'N' else 'rad'}]"}, "exponentformat": "power"},
@@ -99,7 +101,7 @@ def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
         _plot("cone", f"Friction over normal force, {name}", [one for one, _ in lines],
               ("lam [N]", "|friction| [N]"), [_edge(contact.friction, top)]),
         _plot("plane", f"Friction over mu lam in the plane, {name}", [one for _, one in lines],
-              ("friction t1 / (mu lam) [1]", "friction t2 / (mu lam) [1]"), [DISC], square=True),
+              ("friction t1 / (mu lam)", "friction t2 / (mu lam)"), [DISC], square=True),
     ]  # fmt: skip
     if contact.first.type == "plane":
         slips = [_line(trace, i, _slipping(trace, contact, place), most) for i, trace in enumerate(traces)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import share
+from crossbody.reports.judging.told import runs_of, share
 from crossbody.reports.judging.verdict import Row, Word, unit_text
 from crossbody.reports.pages.html import bounded, number
 
@@ -100,6 +100,15 @@ def worst(rows: Sequence[Row]) -> tuple[str, str]:
     return word, str(total) if word == Word.WITHIN.value else f"{counts[word]} of {total}"
 
 
+def verdict(rows: Sequence[Row]) -> str:
+    """The worst word of all runs and how many have it; nothing where nothing was run."""
+    words = Counter(worst(run.rows)[0] for run in runs_of(rows))
+    found = next((word for word in WORST if words[word]), "")
+    if not found:
+        return "not judged" if words[Word.INFO] else ""
+    return "all within" if found == Word.WITHIN else f"{words[found]} {found}"
+
+
 def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | None) -> Cell:
     """The cell of one engine on one case: worst verdict, error of position and run time."""
     if not rows:
@@ -125,15 +134,22 @@ def heat_of(row: Row) -> int:
 
 def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, float]) -> list[Line]:
     """Lines of one case: all together, what it costs (s), every metric judged for some engine, or all."""
-    engines, mine = names(rows), by(rows, "who")
+    mine = by(rows, "who")
+    engines = ran(rows)
     least = min((wall for wall in walls.values() if wall), default=0.0)
     together = [whole(label, page, who, mine[who], None) for who in engines]
     costs = [_cost(walls.get(who), least) for who in engines]
     return [
         Line(text="all judged", small="error of position", cells=together),
-        Line(text="run time", small="over the least", cells=costs),
+        Line(text="run time", small="relative to the fastest", cells=costs),
         *_metrics(rows, mine, engines, page),
     ]
+
+
+def ran(rows: Sequence[Row]) -> list[str]:
+    """Return the engines that have a number in some row; all where none has."""
+    skipped = {row["who"] for row in rows} - {row["who"] for row in rows if row["verdict"] != Word.SKIPPED}
+    return [who for who in names(rows) if who not in skipped] or names(rows)
 
 
 def _cost(wall: float | None, least: float) -> Cell:

@@ -50,6 +50,9 @@ THEME = (
 """Runs before anything is drawn, so that a page does not flash."""
 
 
+UNITLESS = re.compile(r"(<br>|\s)*\[1\]$")  # what a number without a unit would have for one
+
+
 def packed_text(text: str) -> str:
     """A text as base64 of gzip."""
     return _folded(text.encode())
@@ -67,7 +70,10 @@ def _folded(data: bytes) -> str:
 
 
 def _taken(value: Any, arrays: list[bytes]) -> Any:
-    """The value with every array replaced by where its bytes stand behind the text, kind, count and width of rows."""
+    """The value with every array replaced by where its bytes stand behind the text, kind, count and shape of rows.
+
+    Rows are as wide as the last axis, of which a plain array has none.
+    """
     if isinstance(value, Mapping):
         if "bdata" not in value:
             return {key: _taken(each, arrays) for key, each in value.items()}
@@ -75,7 +81,7 @@ def _taken(value: Any, arrays: list[bytes]) -> Any:
         width = max(1, int(value["shape"].split(",")[-1])) if "shape" in value else 1
         place = sum(map(len, arrays))
         arrays.append(_split_bytes(numbers, width))
-        return {"packed": [place, value["dtype"], len(numbers), width]}
+        return {"packed": [place, value["dtype"], len(numbers), width, "shape" in value]}
     return [_taken(each, arrays) for each in value] if isinstance(value, list | tuple) else value
 
 
@@ -120,6 +126,7 @@ class Page:
         title: heading.
         sections: in order.
         lead: one line below the heading.
+        word: the verdict in few words, for the name of the window.
         engines: label and style of every engine that can be shown and hidden on it.
     """
 
@@ -127,6 +134,7 @@ class Page:
     title: str
     sections: Sequence[Section]
     lead: str = ""
+    word: str = ""
     engines: Sequence[Mapping[str, Any]] = ()
 
 
@@ -224,6 +232,8 @@ def plot(figure: Figure | Written) -> dict[str, Any]:
     """A figure as plain values, with its title and height taken out of it; the page gives it its colours."""
     made: dict[str, Any] = figure if isinstance(figure, dict) else json.loads(figure.to_json(engine="json"))
     layout = {key: value for key, value in made["layout"].items() if key not in ("title", "template")}
+    for axis in (value for key, value in layout.items() if key[1:5] == "axis" and "title" in value):
+        axis["title"]["text"] = UNITLESS.sub("", axis["title"]["text"])
     layout["margin"] = {"l": 84, "r": 14, "t": 34, "b": 50}
     value = {"data": made["data"], "layout": layout}
     return {"title": made["layout"]["title"]["text"], "height": layout["height"], "value": value}

@@ -37,6 +37,7 @@ VALUES = columns(
     moved=("Moved by, of the limit", Kind.NUMBER),
 )  # fmt: skip
 SHOWN = 100  # cases on one page of the index
+TITLED = 2  # cases that the title names
 SKETCHED = 80  # points of a sketch of a motion
 
 
@@ -88,11 +89,23 @@ def index_pages(found: Results) -> list[Page]:
     return [
         Page(
             name=name,
-            title="crossbody" if i == 0 else f"crossbody, cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
+            title=_title(found) if i == 0 else f"Cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
             lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
+            word=grid.verdict(found.verdicts),
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip
+
+
+def _title(found: Results) -> str:
+    """The cases, few of them by name."""
+    named = list(dict.fromkeys(case.label for case in found.cases))
+    if len(named) > 1:
+        named = list(dict.fromkeys(label.partition(":")[0] for label in named))
+    if not named:
+        return "crossbody"
+    more = f" and {len(named) - TITLED} more" if len(named) > TITLED else ""
+    return f"{', '.join(named[:TITLED])}{more}"
 
 
 def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> list[Section]:
@@ -160,13 +173,13 @@ def _tiles(found: Results) -> dict[str, Any]:
         {"value": len(found.cases), "title": "cases", "word": ""},
         {
             "value": len({row["who"] for row in found.verdicts if row["engine"] != TRUTH}),
-            "title": "engines with profile",
+            "title": "engine profiles",
             "word": "",
         },
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if failed:
-        tiles.append({"value": failed, "title": "did not get the same physics", "word": Word.OUTSIDE.value})
+        tiles.append({"value": failed, "title": "failed parity audits", "word": Word.OUTSIDE.value})
     return {"tiles": tiles, "warnings": [text for text in (_version(found),) if text]}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class Sheet:
         self.lines: list[tuple[int, dict[str, Any]]] = []
         self.decades: set[int] = set()
         self.ranges: dict[int, tuple[float, float]] = {}
-        self.said: list[str] = []
+        self.far: dict[str, list[tuple[float, str, str]]] = {}
         self.limits: list[tuple[int, float, str]] = []
 
     def limit(self, row: int, value: float, name: str) -> None:
@@ -60,9 +60,9 @@ class Sheet:
         """Draw a plot between two values alone."""
         self.ranges[row] = low, high
 
-    def say(self, text: str) -> None:
-        """Add to the title what cannot be seen."""
-        self.said.append(text)
+    def beyond(self, who: str, size: float, unit: str, where: str) -> None:
+        """Say in the title how far a line goes beyond its plot; of an engine's lines, the farthest."""
+        self.far.setdefault(who, []).append((size, unit, where))
 
     def line(self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, **more: Any) -> None:
         """One line of one engine into plot `row`, thinned; what is not finite is a gap."""
@@ -93,8 +93,8 @@ class Sheet:
 
     def _caption(self, drawn: Sequence[int]) -> str:
         empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
-        told = [f"Nothing to draw of: {', '.join(empty)}"] if empty else []
-        told += [f"Off scale: {'; '.join(dict.fromkeys(self.said))}"] if self.said else []
+        told = [f"Empty and left out: {', '.join(empty)}"] if empty else []
+        told += [f"Off scale: {off_scale(self.far)}"] if self.far else []
         return ". ".join([self.title, *told])
 
     def _axes(self, drawn: Sequence[int]) -> tuple[dict[str, Any], int]:
@@ -111,11 +111,21 @@ class Sheet:
             if i + 1 == len(drawn):
                 axes[f"xaxis{number(i + 1)}"]["title"] = {"text": "time [s]"}
             if row in self.ranges:
-                axes[f"yaxis{number(i + 1)}"]["range"] = list(self.ranges[row])
+                ends = self.ranges[row]
+                axes[f"yaxis{number(i + 1)}"]["range"] = np.log10(ends).tolist() if row in self.decades else list(ends)
             if row in self.decades:
                 axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 9, "exponentformat": "power"}
             top += heights[i] + below[i]
         return axes, TOP + inside + BOTTOM
+
+
+def off_scale(far: Mapping[str, Sequence[tuple[float, str, str]]]) -> str:
+    """Say of each engine how far it goes, in which unit and where, at its farthest."""
+    told = ((who, *max(places), len(places) - 1) for who, places in far.items())
+    return "; ".join(
+        f"{who} up to {size:.3g} {unit} ({where}{f' and {more} more' if more else ''})"
+        for who, size, unit, where, more in told
+    )
 
 
 def _level(axis: str, value: float, name: str) -> dict[str, Any]:

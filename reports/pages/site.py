@@ -128,7 +128,9 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     alone = studied if _leads(found) else []
     for page in index_pages(found):
         if page.name == INDEX:
-            page = replace(page, sections=[*(s for study in alone for s in study.sections), *page.sections])
+            title = ", ".join(study.title for study in alone) if alone and not found.cases else page.title
+            first = [section for study in alone for section in study.sections]
+            page = replace(page, title=title, sections=[*first, *page.sections])
         yield page
     if not alone:
         yield from studied

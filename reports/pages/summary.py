@@ -18,6 +18,7 @@ from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
 
 REFERENCE = "reference:compiled"
+NAMED = 6  # metrics that are named of a deviation, those farthest out first
 TEXT = (
     "A case is trusted with an engine if everything that is judged is within its limit. Errors are "
     "of position, relative to its largest value. Run times are relative to those of "
@@ -111,8 +112,10 @@ def deviations(rows: Iterable[Row]) -> list[Section]:
 def _line(who: str, why: str, rows: list[Row]) -> dict[str, Any]:
     farthest = max((row for row in rows if math.isfinite(share(row))), key=share, default=rows[0])
     text = why[:1].upper() + why[1:]
+    metrics = list(dict.fromkeys(row["metric"] for row in sorted(rows, key=share, reverse=True)))
+    named, more = metrics[:NAMED], len(metrics) - NAMED
     return {
-        "who": who, "why": text, "metrics": ", ".join(dict.fromkeys(row["metric"] for row in rows)),
+        "who": who, "why": text, "metrics": ", ".join(named) + (f" and {more} more" if more > 0 else ""),
         "cases": len({row["label"] for row in rows}), "rows": len(rows), "most": share(farthest),
         "where": f"{farthest['label']}, {farthest['metric']}",
     }  # fmt: skip

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody import hw
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from crossbody.hw import Finding, GroupSurvey, Survey
-
-WIDTH = 120  # of the tables in a file or a pipe
 
 
 def info(path: Path, columns: str | None, part: int | None, draft_only: bool, memory: int = 1000) -> int:
@@ -95,32 +92,29 @@ def printable(text: str) -> str:
 
 
 def _show_group(group: GroupSurvey) -> None:
-    title = f"\n{printable(group.group.name)}: " if group.group.name else "\n"
+    title = f"{printable(group.group.name)}: " if group.group.name else ""
     if math.isfinite(group.step) and group.step > 0:
         clock = printable(group.clock.column) if group.clock else "the file's own steps"
-        print(
+        text = (
             f"{title}{group.rows} rows over {group.duration:.6g} s by {clock}: {1 / group.step:.6g} Hz, "
             f"longest step {group.longest:.3g} s, {group.lost} samples missing, jitter {group.jitter:.2g} s"
         )
     else:
-        print(f"{title}{group.rows} rows, no column of times found")
-    _print(_table(group))
+        text = f"{title}{group.rows} rows, no column of times found"
+    print("\n" + layout.told(text))
+    print(_table(group))
 
 
-def _table(group: GroupSurvey) -> Any:
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("channel", "unit", "type"):
-        table.add_column(name, overflow="fold")
-    for name in ("smallest", "largest", "not finite"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for one in group.columns:
-        words = (one.column.name, one.column.unit or "-", one.column.type)
-        numbers = (f"{one.low:.6g}", f"{one.high:.6g}", str(one.missing))
-        table.add_row(*(Text(printable(word)) for word in words), *numbers)
-    return table
+def _table(group: GroupSurvey) -> str:
+    columns = {
+        "unit": [printable(one.column.unit or "-") for one in group.columns],
+        "type": [printable(one.column.type) for one in group.columns],
+        "smallest": [f"{one.low:.6g}" for one in group.columns],
+        "largest": [f"{one.high:.6g}" for one in group.columns],
+        "not finite": [str(one.missing) for one in group.columns],
+    }
+    names = [printable(one.column.name) for one in group.columns]
+    return layout.laid_out(names, columns, layout.columns(), head="channel", left_out=("type",))
 
 
 def _show_findings(findings: Sequence[Finding]) -> None:
@@ -129,10 +123,5 @@ def _show_findings(findings: Sequence[Finding]) -> None:
     for one in findings:
         kind = "fault" if one.fault else "note"
         when = f", t = {one.t:.9g} s" if math.isfinite(one.t) else ""
-        print(f"  {kind}: {one.check}: {printable(one.channel)}, row {one.row}{when}: {printable(one.text)}")
-
-
-def _print(table: Any) -> None:
-    from rich.console import Console
-
-    (Console() if sys.stdout.isatty() else Console(width=WIDTH)).print(table)
+        where = f"{printable(one.channel)}, row {one.row}{when}"
+        print(layout.told(f"  {kind}: {one.check}: {where}: {printable(one.text)}"))

@@ -136,7 +136,7 @@ def _gap_lines(out: Path) -> Table:
 
     lines = summary(_rows(out, "gapmap"))
     lines["who"] = lines["engine"] + ":" + lines["profile"]
-    return _table("Gap map, a line an engine", words.GAPS, lines, "gapmap")
+    return _table("Gap map by engine", words.GAPS, lines, "gapmap")
 
 
 def _gap_map(out: Path) -> Iterator[Plot]:
@@ -148,7 +148,7 @@ def _gap_map(out: Path) -> Iterator[Plot]:
 def _scenes(out: Path) -> Table:
     rows = _rows(out, "stability")
     rows = rows.assign(scene=rows["scene"].replace("", "default"))
-    return _table("Stability map, a line a scene", words.STABILITY, rows, "stability")
+    return _table("Stability map by scene", words.STABILITY, rows, "stability")
 
 
 def _stability(out: Path) -> Iterator[Plot]:

@@ -59,7 +59,7 @@ BENCH_TEXT = (
 )
 ORDERS = columns(
     case="Case", who="Engine", knob="Setting", order=("Observed order", Kind.NUMBER),
-    promised=("Promised order", Kind.NUMBER), says=("Says", Kind.LONG),
+    promised=("Promised order", Kind.NUMBER), says=("Comment", Kind.LONG),
 )  # fmt: skip
 TIMINGS = columns(
     case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER),
@@ -87,7 +87,7 @@ HEADLINE = columns(
     reference_ms=("Reference [ms]", Kind.NUMBER), ratio=("Ratio", Kind.NUMBER),
     ratio_call=("Ratio of the Python calls", Kind.NUMBER), ratio_native=("Its own loop alone", Kind.NUMBER),
     least_ratio=("Least ratio", Kind.NUMBER), interpreted=("Interpreted in its run", Kind.LONG),
-    ahead="Ahead at every error", says=("Says", Kind.LONG),
+    ahead="Ahead at every error", says=("Comment", Kind.LONG),
 )  # fmt: skip
 CONFORMANCE_TEXT = (
     "One file for each feature. Every engine's own reader reads it in a separate process, and "
@@ -100,8 +100,8 @@ CONFORMANCE_TEXT = (
 DETAILS = columns(
     feature="Feature", engine="Engine", version="Version", verdict=("Verdict", Kind.VERDICT),
     quantity="Quantity", where="Where", value=("Value", Kind.NUMBER), expected=("Expected", Kind.NUMBER),
-    why=("It says", Kind.LONG), rule=("Rule of the format", Kind.LONG),
-    rewrite=("How all agree", Kind.LONG), text=("File", Kind.CODE),
+    why=("Message", Kind.LONG), rule=("Rule of the format", Kind.LONG),
+    rewrite=("Portable form", Kind.LONG), text=("File", Kind.CODE),
 )  # fmt: skip
 GAPS_TEXT = (
     "Elastic sliders, hit by one ball; s = gap sqrt(a0) / v is the gap relative to the deepest "
@@ -112,7 +112,7 @@ GAPS_TEXT = (
 GAPS = columns(
     n=("Balls", Kind.NUMBER), who="Engine", machine="Law or rule", most=("Most energy created", Kind.NUMBER),
     at_s=("at s", Kind.NUMBER), at_touch="Touching, nearest to", ideal_from=("Ideal from s", Kind.NUMBER),
-    failed=("Failed", Kind.NUMBER), why=("Says", Kind.LONG),
+    failed=("Failed", Kind.NUMBER), why=("Comment", Kind.LONG),
 )  # fmt: skip
 STABILITY_TEXT = (
     "The closed loop with one change at a time: bounds, gains, the model inside the "
@@ -122,7 +122,7 @@ STABILITY_TEXT = (
 STABILITY = columns(
     who="Engine", scene="Scene", expected="Published", outcome="Outcome",
     arrival=("Arrival [s]", Kind.NUMBER), ended=("End [s]", Kind.NUMBER),
-    changes=("Rings passed", Kind.NUMBER), why=("Says", Kind.LONG),
+    changes=("Rings passed", Kind.NUMBER), why=("Comment", Kind.LONG),
 )  # fmt: skip
 STRESS_TEXT = (
     "Quasi-random and gridded extreme scenes, each bounded in steps and time. A run is outside "
@@ -142,14 +142,14 @@ SUITES = columns(
     not_run=("Not run", Kind.NUMBER), outside=("Outside", Kind.NUMBER),
     with_truth=("With truth", Kind.NUMBER), worst_error=("Worst error", Kind.NUMBER),
     worst_residual=("Worst energy residual", Kind.NUMBER), seconds=("Time [s]", Kind.NUMBER),
-    outcomes="Other ends",
+    outcomes="Other outcomes",
 )  # fmt: skip
 CELLS = columns(
     who="Engine", a0=("a0 [1/s²]", Kind.NUMBER), knob="Knob", setting=("Setting", Kind.NUMBER),
     runs=("Runs", Kind.NUMBER), finished=("Finished", Kind.NUMBER), worst_error=("Worst error", Kind.NUMBER),
-    outcomes="Other ends",
+    outcomes="Other outcomes",
 )  # fmt: skip
 FAILED = columns(
     verdict=("Verdict", Kind.VERDICT), outcome="Outcome", who="Engine", suite="Suite",
-    count=("Times", Kind.NUMBER), why=("Says", Kind.LONG), command=("Command", Kind.CODE),
+    count=("Times", Kind.NUMBER), why=("Comment", Kind.LONG), command=("Command", Kind.CODE),
 )  # fmt: skip

@@ -24,7 +24,7 @@ METRICS = columns(
     verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 FINDINGS = columns(
-    what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Says", Kind.LONG)
+    what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Comment", Kind.LONG)
 )
 
 
@@ -50,7 +50,9 @@ def sections(out: Path) -> tuple[Section, ...]:
             plots.append(Plot(name=name, figure=draw(left, noise, held), time=True))
     plots += [Plot(name="replay-correlation", figure=figure.correlation(correlated))] if len(correlated) else []
     origin = "SYNTHETIC, no measurement." if about["synthetic"] else "A measurement."
-    text = f"{judged(metrics)} {origin} {about['file']}{about['about'] and ': '}{about['about']}"
+    text = f"{origin} {about['file']}{about['about'] and ': '}{about['about']}"
+    if not held:  # windows held out of a fit are judged with it
+        text = f"{judged(metrics)} {text}"
     table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")
     shown = [
         Section(name="replay", title="Log and model", text=text, tables=(table,)),

@@ -1,11 +1,13 @@
 """Pieces that are compiled beside the kernels of a mechanism, and work that compiling is spared."""
 
 import gc
+import os
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,9 +16,10 @@ from numba import float64, void
 from numba.core.errors import NumbaRuntimeError, TypingError
 from numba.core.types.functions import BaseFunction
 
-from crossbody.reference import _program, ahead, code_store, kernels
+from crossbody.reference import _program, ahead, kernels
 from crossbody.reference._hastened import hastened
 from crossbody.reference.cache import ALLOCATES, ALLOCATES_NOTHING, Compiled, Part, compiled
+from crossbody.reference.compiling import Count
 from crossbody.reference.systems import absent
 
 
@@ -34,7 +37,9 @@ def begun(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[list[str]]]:
     found: list[list[str]] = []
     monkeypatch.setattr(ahead, "_alone", False)
     monkeypatch.setattr(ahead.atexit, "register", lambda *given: None)
-    monkeypatch.setattr(ahead.subprocess, "Popen", lambda call, **how: found.append(call))
+    monkeypatch.setattr(
+        ahead.subprocess, "Popen", lambda call, **_how: found.append(call) or SimpleNamespace(stdout=())
+    )
     ahead.begin.cache_clear()
     yield found
     ahead.begin.cache_clear()
@@ -55,17 +60,36 @@ def test_the_loop_is_begun_with_the_first_code_that_is_compiled_and_not_where_it
 
 @pytest.mark.parametrize("processors", [1, 2])
 def test_it_is_begun_where_a_processor_is_free_and_said_at_once(
-    processors: int, begun: list[list[str]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+    processors: int, begun: list[list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(code_store, "_told", set())
-    monkeypatch.setattr(_program, "is_missing", lambda: True)
+    count, said = Count(show=lambda *told: said.append(told)), list[tuple[int, int]]()
+    monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path))
+    monkeypatch.setattr(ahead, "count", count)
     monkeypatch.setattr(ahead.os, "cpu_count", lambda: processors)
     ahead.begin()
     ahead.begin()
     assert [call[0] for call in begun] == [sys.executable] * (processors - 1)
-    assert all(repr(name) in call[2] for call in begun for name in ahead.BESIDE)
+    assert all("compile_beside" in call[2] for call in begun)
     assert set(ahead.BESIDE) <= set(ahead.PIECES)
-    assert capsys.readouterr().err == f"crossbody: {code_store.COMPILING}\n"
+    assert said == [(0, len(count.needed))]
+    roots = ("core.advance.advance", "core.instant_answers.answer", "sundials.compiled.evaluation.evaluate")
+    assert {f"crossbody.reference.{name}" for name in roots} < count.needed
+
+
+def test_the_process_beside_names_what_is_ready(monkeypatch: pytest.MonkeyPatch) -> None:
+    pieces, count = list[str](), Count()
+    monkeypatch.setattr(ahead, "compile_piece", lambda name: (pieces.append(name), count.done(f"a.{name}")))
+    monkeypatch.setattr(ahead, "count", count)
+    read, write = os.pipe()
+    with os.fdopen(write, "w") as out, redirect_stdout(out):
+        ahead.compile_beside()
+    assert tuple(pieces) == ahead.BESIDE
+    here = Count()
+    here.need(f"a.{name}" for name in ahead.BESIDE)
+    monkeypatch.setattr(ahead, "count", here)
+    with os.fdopen(read) as names:
+        ahead._follow(names)
+    assert here.ready == here.needed
 
 
 def test_nothing_is_begun_where_the_loop_is_kept(begun: list[list[str]]) -> None:

@@ -31,3 +31,4 @@ def test_every_bit_of_every_array_comes_back(kind: str, rows: int, width: int, s
     assert found["a"][0]["more"] == [1, None, "</script>"]
     for back, array in zip((found["a"][0]["x"], found["b"]), arrays, strict=True):
         assert back.tobytes() == array.tobytes()
+        assert back.shape == array.shape or not back.size

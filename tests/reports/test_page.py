@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -28,10 +29,11 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.html import KeptTemplates, Page, file_name
+from crossbody.reports.pages.html import KeptTemplates, Page, file_name, plot
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
+from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 
 HOSTILE = "<script>alert(1)</script>"
@@ -91,6 +93,63 @@ def test_every_figure_is_there_and_has_data(out: Path) -> None:
         assert figure["data"], name
 
 
+def test_a_window_is_named_by_the_cases_and_the_verdict(out: Path, tmp_path: Path) -> None:
+    def title(page: Path) -> str:
+        return unescape(re.findall("<title>(.*?)</title>", page.read_text())[0])
+
+    assert title(out / "index.html") == title(out / CASE) == "bouncing_ball:linear: 1 outside · crossbody"
+    many = made(tmp_path / "many", [], fake_rows(4))
+    assert title(many / "index.html") == "case 0, case 1 and 2 more: all within · crossbody"
+
+
+def test_engines_that_did_not_run_have_no_column_on_the_page_of_the_case(out: Path) -> None:
+    def named(page: str) -> list[str]:
+        heads = [attrs["data-name"] for tag, attrs in Tags((out / page).read_text()).found if "data-name" in attrs]
+        return [name for name in heads if name and ":" in name]
+
+    assert f"fake:{HOSTILE}" in named(CASE)
+    assert "absent:*" not in named(CASE)
+    assert "absent:*" in named("index.html")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_is_left_before_an_event_does_not_stretch_the_plot_of_steps(seed: int, result: CaseResult) -> None:
+    """Steps of a collision are drawn; one in a thousand that is left over is not."""
+    draw = np.random.default_rng(seed)
+    lengths = 10.0 ** draw.uniform(-6.0, -3.0, 1000)
+    lengths[draw.integers(1000)] = 1e-16
+    truth = result.truth.trajectory
+    about = study.traces(result)[0].about | {"steps": [np.cumsum(lengths).tolist(), lengths.tolist()]}
+    low, high = figures.steps([Trace(about=about, run=truth)])["layout"]["yaxis"]["range"]
+    assert -7.0 < low < -5.0
+    assert -3.0 < high < -2.0
+
+
+def test_without_a_force_no_work_of_contacts_is_drawn(result: CaseResult) -> None:
+    trace = study.traces(result)[0]
+    assert trace.run.ledger is not None
+    still = replace(trace.run.ledger, contact=0.0 * trace.run.ledger.contact)
+    titles = [
+        figures.energy([replace(trace, run=replace(trace.run, ledger=ledger))])["layout"]["title"]["text"]
+        for ledger in (trace.run.ledger, still)
+    ]
+    assert ["work of contacts" in title for title in titles] == [False, True]
+
+
+def test_numbers_and_their_heads_end_at_the_same_side(out: Path) -> None:
+    compared = 0
+    for page in every(out):
+        for table in re.findall(r"<table data-csv.*?</table>", page.read_text(), re.DOTALL):
+            head, _, body = table.partition("<tbody>")
+            sides = [
+                ["num" in (attrs.get("class") or "").split() for name, attrs in Tags(part).found if name == tag]
+                for part, tag in ((head, "th"), (body.partition("</tr>")[0], "td"))
+            ]
+            assert sides[0] == sides[1] or len(sides[0]) != len(sides[1])
+            compared += sum(sides[0])
+    assert compared > 5
+
+
 def test_every_axis_has_its_unit(out: Path) -> None:
     for name, figure in plots(out).items():
         axes = {k: v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d*", k)}
@@ -99,6 +158,15 @@ def test_every_axis_has_its_unit(out: Path) -> None:
         assert titled
         assert hidden == (["yaxis"] if name == "modes" else []), f"{name}: {hidden} has no title"
         assert all(re.search(r"\[.+\]|^relative ", text) for text in titled), titled
+
+
+@pytest.mark.parametrize("unit", ["<br>[1]", " [1]", "\n[1]"])
+def test_an_axis_without_a_unit_has_none(unit: str) -> None:
+    axes = {"yaxis": {"title": {"text": f"q1{unit}"}}, "xaxis3": {"title": {"text": "a[1] [m]"}}, "yaxis2": {}}
+    found = plot({"data": [], "layout": {"title": {"text": "a [1]"}, "height": 1} | axes})
+    assert found["value"]["layout"]["yaxis"]["title"]["text"] == "q1"
+    assert found["value"]["layout"]["xaxis3"]["title"]["text"] == "a[1] [m]"
+    assert found["title"] == "a [1]"
 
 
 def test_lines_are_told_apart_by_dashes_too(out: Path) -> None:

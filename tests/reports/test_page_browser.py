@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from ladder import ladder
 from resting import plate
-from study_pages import studies
+from study_pages import page_of, studies
 
-from crossbody.cases import Case, from_scene, load
+from crossbody.cases import from_scene, load
 from crossbody.cases.scene import Body, Joint, Scene, Shape
-from crossbody.engines import Run
 from crossbody.engines import load as load_engine
 from crossbody.reports import sections
 from crossbody.reports.judging.comparison import Entry
@@ -91,6 +90,22 @@ def test_plots_have_lines(out: Path, browser: chromium.Browser) -> None:
     )
 
 
+def test_a_heat_map_has_a_colour_for_each_pair_of_its_axes(whole: Path, browser: chromium.Browser) -> None:
+    """What plotly is given as one row has colours on its diagonal alone."""
+    seen = 0
+    for page in [page for page in whole.glob("*.html") if not page.name.startswith(("case-", "index"))]:
+        browser.open(page)
+        draw_all(browser)
+        tables = browser.js(
+            "[...document.querySelectorAll('.plot')].flatMap(({ data }) => data)"
+            ".filter(({ type }) => type === 'heatmap')"
+            ".map(({ x, y, z }) => [x.length, y.length, z.length, ...new Set([...z].map((row) => row.length))])"
+        )
+        assert all((z, *rows) == (y, x) for x, y, z, *rows in tables)
+        seen += len(tables)
+    assert seen
+
+
 def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browser) -> None:
     browser.open(out / CASE)
     browser.js("document.querySelector('.player').scrollIntoView()")
@@ -140,17 +155,6 @@ def test_one_steps_from_event_to_event_and_sees_differences_larger(out: Path, br
     browser.js(NEXT_FRAME)
     assert browser.picture(".player canvas") != plain
     assert browser.complaints() == []
-
-
-def page_of(case: Case, out: Path, *runs: Run) -> Path:
-    """Write the page of one case and its runs into a folder that is made here."""
-    entries = tuple(Entry(engine=run.engine, profile=run.profile, run=run.run()) for run in runs)
-    results = [CaseResult(case=case, truth=truth_of(case), entries=entries)]
-    with folder(out) as made:
-        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
-        site.write(made)
-    (page,) = out.glob("case-*.html")
-    return page
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,9 @@ from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import load as load_engine
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.figures import force, motion, note, penetration, suits
+from crossbody.reports.pages.figures import carrying, force, motion, note, penetration, suits
 from crossbody.reports.pages.friction import hysteresis
+from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs import study
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.runs.jobs import run_case
@@ -65,7 +66,7 @@ def test_a_row_that_is_always_on_has_no_loop() -> None:
 def test_a_force_beyond_the_plot_is_named(run: Trajectory) -> None:
     drawn = force([trace(run), trace(replace(run, lam=100.0 * run.lam), "wild")])
     top = float(np.nanmax(run.lam))
-    assert f"Off scale: floor, wild:p reaches {100.0 * top:.2g} N" in drawn["layout"]["title"]["text"]
+    assert drawn["layout"]["title"]["text"].endswith(f"Off scale: wild:p up to {100.0 * top:.3g} N (floor)")
     assert top < drawn["layout"]["yaxis"]["range"][1] < 2.0 * top
     calm = force([trace(run), trace(replace(run, lam=1.2 * run.lam), "calm")])
     assert "Off scale" not in calm["layout"]["title"]["text"]
@@ -73,7 +74,7 @@ def test_a_force_beyond_the_plot_is_named(run: Trajectory) -> None:
     (section,) = hysteresis([trace(run), trace(replace(run, lam=100.0 * run.lam), "wild")])
     shape = section.plots[0].figure["layout"]
     assert shape["yaxis"]["range"] == drawn["layout"]["yaxis"]["range"]
-    assert shape["title"]["text"].endswith(f"Off scale: wild:p reaches {100.0 * top:.2g} N")
+    assert shape["title"]["text"].endswith(f"Off scale: wild:p up to {100.0 * top:.3g} N (floor)")
 
 
 def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> None:
@@ -87,6 +88,25 @@ def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> Non
     assert [text.partition("<br>")[0] for text in titles] == ["lam floor", "impulse"]
     assert note("force", [bears]).endswith("Without a force in every run: wall.")
     assert (suits("force", [bears]), suits("force", [idles])) == (True, False)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_forces_of_rounding_are_none_whatever_the_unit_of_mass(run: Trajectory, seed: int) -> None:
+    """Of rows beside one that bears, and of one that bears nothing itself but rounding."""
+    draw = np.random.default_rng(seed)
+    units = 10.0 ** draw.uniform(-6.0, 6.0)
+    noise = draw.normal(size=run.lam.shape) * units * float(np.nanmax(run.lam)) * np.finfo(float).eps
+    doubled = {name: np.repeat(getattr(run, name), 2, axis=1) for name in ("gap", "mode")}
+    for bears in (1.0, 0.0):
+        lam = np.c_[bears * units * run.lam + noise, noise]
+        found = trace(replace(run, lam=lam, energy=units * run.energy, ledger=None, **doubled))
+        found = replace(found, about=found.about | {"contacts": ["floor", "wall"]}, truth=None)
+        assert carrying([found]) == ([0] if bears else [])
+
+
+def test_of_an_engine_that_is_off_scale_everywhere_the_farthest_is_named() -> None:
+    far = {"a:p": [(3.0, "N", "x"), (500.0, "N", "y"), (70.0, "N", "z")], "b:p": [(12345.0, "N m", "x")]}
+    assert off_scale(far) == "a:p up to 500 N (y and 2 more); b:p up to 1.23e+04 N m (x)"
 
 
 def test_of_many_rows_that_carry_nothing_a_few_are_named(run: Trajectory) -> None:

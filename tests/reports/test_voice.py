@@ -11,8 +11,11 @@ import log_files
 import numpy as np
 import pytest
 
+from crossbody.cases import InvalidValue
+from crossbody.reference import compiling
 from crossbody.reports import voice
 from crossbody.reports.cli import cli, main
+from crossbody.reports.runs import choice
 
 
 def leaves(group: click.Group, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], click.Command]]:
@@ -116,3 +119,20 @@ def test_progress_tells_the_time_left_to_a_terminal_only(
     said = capsys.readouterr().err
     assert "left" in said
     assert "two" in said
+
+
+@pytest.mark.parametrize(("options", "told"), [((), True), (("--quiet",), False), (("--json",), False)])
+def test_what_is_compiled_is_told_unless_nothing_is_to_be(
+    options: tuple[str, ...], told: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def compiles(*_given: object, **_asked: object) -> None:
+        counted.tell()
+        raise InvalidValue("Enough.")
+
+    counted = compiling.Count()
+    monkeypatch.setattr(voice, "count", counted)
+    monkeypatch.setattr(choice, "load_cases", compiles)
+    call("run", "bouncing_ball", *options)
+    assert ("compiling the reference" in capsys.readouterr().err) == told
+    counted.tell()
+    assert "compiling the reference" in capsys.readouterr().err, "for the command alone"

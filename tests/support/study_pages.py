@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from crossbody.cases import Case
+from crossbody.engines import Run
 from crossbody.reports.cli import main
+from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.pages import site
+from crossbody.reports.runs import study
+from crossbody.reports.runs.jobs import CaseResult
+from crossbody.reports.runs.output import folder
 
 MAP = """[time]
 column = "t [s]"
@@ -37,7 +45,7 @@ def commands(folder: Path) -> dict[str, tuple[str, ...]]:
     return {
         "gapmap": (*ONE, "--n", "3", "--points", "5"),
         "bode": ("soft_contact",),
-        "analyse": ("delta_impulse", "--at", "z=0.4", "--bode"),
+        "analyse": ("delta_impulse", "--at", "z=0.4", "--bode", "--map"),
         "stress": ("gap", *ONE, "--runs", "4", "--jobs", "1"),
         "replay": (*log, *ONE),
         "identify": (*log, "-f", "k1"),
@@ -53,3 +61,14 @@ def studies(folder: Path) -> list[Path]:
             main([name, *arguments, "--quiet", "--out", str(folder / name)])
         assert not end.value.code, name
     return [folder / name for name in asked]
+
+
+def page_of(case: Case, out: Path, *runs: Run) -> Path:
+    """Write the page of one case and its runs into a folder that is made here."""
+    entries = tuple(Entry(engine=run.engine, profile=run.profile, run=run.run()) for run in runs)
+    results = [CaseResult(case=case, truth=truth_of(case), entries=entries)]
+    with folder(out) as made:
+        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
+        site.write(made)
+    (page,) = out.glob("case-*.html")
+    return page

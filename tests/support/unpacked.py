@@ -24,11 +24,12 @@ def value_of(folded: str) -> Any:
     def array(given: dict[str, Any]) -> Any:
         if "packed" not in given:
             return given
-        place, kind, count, width = given["packed"]
+        place, kind, count, width, rows = given["packed"]
         size = np.dtype(kind).itemsize
         apart = np.frombuffer(data, np.uint8, count * size, end + place).reshape(size, count).T.copy()
         apart = apart.view(f"<u{size}").reshape(-1, width)
-        return np.cumsum(apart, axis=0, dtype=apart.dtype).ravel().view(f"<{kind}")
+        found = np.cumsum(apart, axis=0, dtype=apart.dtype).ravel().view(f"<{kind}")
+        return found.reshape(-1, width) if rows else found
 
     return json.loads(data[4:end], object_hook=array)
 

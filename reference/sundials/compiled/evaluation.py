@@ -13,17 +13,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numba import types
 
 from crossbody.reference import kernels
 from crossbody.reference._program import address, at_address, bound
-from crossbody.reference._system import System
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.bundles import ADDRESSES, TABLE, bundle_type, opener, table
 from crossbody.reference.kinds import Array, Floats, Floats2, Index
+
+if TYPE_CHECKING:
+    from crossbody.reference._system import System
 
 # What is asked of `evaluate`.
 DERIVATIVE, TERMS, FORCES, BEGIN, SCAN, GRID, WATCHED, RESIDUAL = range(8)
@@ -724,8 +726,8 @@ _ARGUMENTS = (
 
 
 dynamics_at, gaps_at, rows_at, power_at, velocity_at, watch_at = (at_address(kernels.REAL[name]) for name in _USED)
-_SIGNATURE = types.int64(*(kernels.function_type(name) for name in _USED), *_ARGUMENTS)
-evaluate_at = at_address(_SIGNATURE)
+SIGNATURE = types.int64(*(kernels.function_type(name) for name in _USED), *_ARGUMENTS)
+evaluate_at = at_address(SIGNATURE)
 
 
 def _evaluate_at(at, what, t, y, out, lines):  # type: ignore[no-untyped-def]
@@ -740,7 +742,7 @@ def _evaluate_at(at, what, t, y, out, lines):  # type: ignore[no-untyped-def]
 def compile_equations() -> tuple[Any, int]:
     """`evaluate` as it is called from Python, and where it stands."""
     call = compiled(_evaluate_at, [types.int64(ADDRESSES, *_ARGUMENTS)])
-    return call, address(compiled(evaluate, [_SIGNATURE]), _SIGNATURE)
+    return call, address(compiled(evaluate, [SIGNATURE]), SIGNATURE)
 
 
 def entry(system: System) -> Callable[..., int]:

@@ -17,13 +17,13 @@ const crossbody = (() => {
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));
   };
   const ARRAYS = { f4: [Float32Array, Uint32Array], f8: [Float64Array, BigUint64Array], i1: [Int8Array, Uint8Array], i2: [Int16Array, Uint16Array], i4: [Int32Array, Uint32Array] };
-  const numbers = (bytes, [place, kind, count, width]) => {
+  const numbers = (bytes, [place, kind, count, width, rows]) => {
     const [Array_, Whole] = ARRAYS[kind];
     const [size, raw] = [Array_.BYTES_PER_ELEMENT, new Uint8Array(count * Array_.BYTES_PER_ELEMENT)];
     for (let k = 0; k < size; k += 1) for (let i = 0; i < count; i += 1) raw[i * size + k] = bytes[place + k * count + i];
     const whole = new Whole(raw.buffer);
     for (let i = width; i < count; i += 1) whole[i] += whole[i - width];
-    return new Array_(raw.buffer);
+    return Object.assign(new Array_(raw.buffer), rows && { width });
   };
   const text = (element) => inflated(element).text();
   const value = async (element) => {

@@ -79,11 +79,15 @@
     script.textContent = text;
     document.head.append(script);
   });
+  // Plotly takes a table, such as that of a heat map, as an array of its rows.
+  const tabulate = (trace) => Object.entries(trace).forEach(([key, { width, length } = {}]) => {
+    if (width && length) trace[key] = Array.from({ length: length / width }, (_, i) => trace[key].subarray(i * width, (i + 1) * width));
+  });
   const known = new Map(); // figures that are unfolded: these are drawn at once, which a print does not wait for
   const ready = new Map();
   const prepare = (box) => {
     const value = crossbody.value(document.querySelector(`script[data-plot="${CSS.escape(box.id)}"]`));
-    ready.set(box, Promise.all([value, library]).then(([figure]) => { known.set(box, figure); }));
+    ready.set(box, Promise.all([value, library]).then(([figure]) => { figure.data.forEach(tabulate); known.set(box, figure); }));
     watch.observe(box);
   };
   const make = (box) => {

@@ -1,0 +1,148 @@
+"""Tables of the command line: they fit the terminal by leaving columns out, never digits, and no line is wrapped."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import sys
+import textwrap
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from crossbody.reports.judging.verdict import unit_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+WIDTH = 120  # of a table in a file or a pipe
+NOTHING = {"-", ""}
+"""Cells that say nothing."""
+UNITS = {"ms": "[ms]", "s": "[s]"}
+"""Ends of the names of columns, and how a head says them."""
+
+
+def columns() -> int:
+    """Return how many columns there are for a table."""
+    return shutil.get_terminal_size((WIDTH, 24)).columns
+
+
+def told(text: str, indent: int = 4) -> str:
+    """Return a sentence; on a terminal folded to its width, and indented from its second line on."""
+    if not sys.stdout.isatty():
+        return text
+    return textwrap.fill(text, columns(), subsequent_indent=" " * indent, break_on_hyphens=False)
+
+
+def laid_out(
+    names: Sequence[str], cells: Mapping[str, Sequence[str]], width: int, *, head: str = "",
+    above: Sequence[str] = (), left_out: Sequence[str] = (), colours: Mapping[str, str] | None = None,
+) -> str:  # fmt: skip
+    """Lay out a table.
+
+    Args:
+        names: of the lines, which stay; cut where they take more than half the width and columns need the room.
+        cells: columns by their heads. Those that say nothing are left out.
+        width: columns that no line exceeds.
+        head: of the names.
+        above: what stands above lines of the same, once; nothing where it is empty.
+        left_out: columns that go first, in this order, where it is too wide; then go the last ones.
+        colours: of columns, where a cell is not "0".
+    """
+    cells = {one: column for one, column in cells.items() if set(column) - NOTHING}
+    indent = "  " if above else ""
+    lines = [indent + one for one in (head, *names)]
+    whole = max(map(len, lines))
+    first = whole if whole + _beside(cells) <= width else min(whole, width // 2)
+    for one in [*left_out, *reversed([one for one in cells if one not in left_out])]:
+        if first + _beside(cells) > width and len(cells) > 1:
+            cells.pop(one, None)
+    first = min(whole, max(width - _beside(cells), len(indent) + 1))
+    lines = [_cut(line, first).ljust(first) for line in lines]
+    for one, column in cells.items():
+        texts = _aligned(one, column)
+        colour = (colours or {}).get(one)
+        lines[0] += f"  {texts[0]}"
+        for i, text in enumerate(texts[1:]):
+            lines[i + 1] += "  " + (click.style(text, fg=colour) if colour and column[i] != "0" else text)
+    for i in reversed(range(len(above))):
+        if i == 0 or above[i] != above[i - 1]:
+            lines.insert(i + 1, click.style(_cut(above[i], width), bold=True))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def split(names: Sequence[str], cells: Mapping[str, Sequence[str]], width: int, **more: Any) -> str:
+    """Lay out a table whose columns are all needed: those that do not fit stand in another one below it."""
+    left, parts = dict(cells), list[str]()
+    room = width - max(map(len, names), default=0)
+    while left:
+        ends = list(accumulate(2 + _wide(one, column) for one, column in left.items()))
+        mine = list(left)[: max(bisect_right(ends, room), 1)]
+        parts.append(laid_out(names, {one: left.pop(one) for one in mine}, width, **more))
+    return "\n\n".join(parts)
+
+
+def frame(
+    rows: pd.DataFrame, width: int, *, digits: int = 4, heads: Mapping[str, str] | None = None, names: str = "",
+    above: str = "", left_out: Sequence[str] = (),
+) -> str:  # fmt: skip
+    """Lay out a table of pandas, with the columns `engine` and `profile` as one.
+
+    Args:
+        rows: the table.
+        width: columns that no line exceeds.
+        digits: of numbers.
+        heads: of columns whose names do not say it.
+        names: the column of the lines' names; engines if there are some, else the first.
+        above: the column that stands above lines of the same; none if not given.
+        left_out: columns that go first.
+    """
+    texts = {str(one): [_text(value, digits) for value in rows[one]] for one in rows.columns}
+    if "unit" in texts:
+        texts["unit"] = [unit_text(unit, "{}") for unit in texts["unit"]]
+    if {"engine", "profile"} <= set(texts):
+        who = zip(texts["engine"], texts.pop("profile"), strict=True)
+        texts["engine"] = [":".join(one) for one in who]
+    names = names or next((one for one in texts if one == "engine"), next(one for one in texts if one != above))
+    groups, lines = texts.pop(above) if above else [], texts.pop(names)
+    said = {one: (heads or {}).get(one) or _head(one) for one in (names, *texts)}
+    return laid_out(
+        lines, {said[one]: column for one, column in texts.items()}, width, head=said[names], above=groups,
+        left_out=[said[one] for one in left_out if one in texts],
+    )  # fmt: skip
+
+
+def _head(name: str) -> str:
+    """A name of a column with spaces, and its unit in brackets."""
+    words = name.split("_")
+    return " ".join([*words[:-1], UNITS.get(words[-1], words[-1])] if len(words) > 1 else words)
+
+
+def _text(value: Any, digits: int) -> str:
+    if isinstance(value, float):
+        return "-" if math.isnan(value) else f"{value:.{digits}g}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "-" if value is None else str(value)
+
+
+def _cut(text: str, room: int) -> str:
+    return text if len(text) <= room else text[: max(room - 1, 0)] + "…"
+
+
+def _wide(head: str, column: Sequence[str]) -> int:
+    return max(map(len, (head, *column)))
+
+
+def _beside(cells: Mapping[str, Sequence[str]]) -> int:
+    return sum(2 + _wide(head, column) for head, column in cells.items())
+
+
+def _aligned(head: str, column: Sequence[str]) -> list[str]:
+    """The head and the cells of a column in one width: words begin at the left, numbers end at the right."""
+    words = any(cell[:1].isalpha() and cell not in ("nan", "inf") for cell in column)
+    wide = _wide(head, column)
+    return [text.ljust(wide) if words else text.rjust(wide) for text in (head, *column)]
