@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,7 @@ from rig_data import channels, log_of
 
 from crossbody import hw
 from crossbody.cases import SceneError
+from crossbody.hw.replaying.replay import _shortened
 from crossbody.hw.windows.rates import derivatives, rates_by_fit
 from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way
 from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
@@ -61,6 +63,23 @@ def test_windows_hold_the_rows_from_each_restart_to_its_horizon(seed: int) -> No
     shared = [sum(one.t[0] < other.t[0] < one.t[-1] for other in cut) for one in cut]
     assert overlap(cut) == max(shared)
     assert overlap([*cut, *cut]) == max(shared)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_shortened_window_is_that_of_a_log_that_ends_there(seed: int) -> None:
+    """With inputs and without."""
+    random = np.random.default_rng(seed)
+    log, model = recorded(random), hw.models.load("double_pendulum")
+    if seed % 3 == 0:
+        log = replace(log, channels=tuple(one for one in log.channels if one.role != "inputs"))
+    (whole,) = windows(log, model, restart=0.0)
+    count = int(random.integers(FEWEST + 1, len(log)))
+    (wanted,) = windows(log.window(log.time[0], log.time[count]), model, restart=0.0)
+    found = _shortened(whole, count)
+    for name in ("t", "age", "y", "u"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+    for name in ("y", "yd", "t_end", "times", "inputs"):
+        np.testing.assert_array_equal(getattr(found.segment, name), getattr(wanted.segment, name))
 
 
 def test_a_window_has_eight_samples_and_lies_inside_the_log() -> None:
