@@ -102,6 +102,18 @@ def test_creep_is_the_slip_of_what_holds() -> None:
     assert measured("creep_speed", early) is None
 
 
+@pytest.mark.parametrize(("low", "high", "creep"), [(1e-3, 6e-3, 5e-3), (3e-3, 4e-3, 3e-3), (-2e-3, 2e-3, 4e-3)])
+def test_the_fastest_creep_of_two_contacts_counts(low: float, high: float, creep: float) -> None:
+    places = [0, 0, 0.1, 1, 0, 0, 0, 0, 0, 0.3, 1, 0, 0, 0]
+    case = case_of(stack(0.5, 0.5), q0=places, t_end=0.1)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    v = run.v.copy()
+    v[-1, 0], v[-1, 6] = low, high
+    assert (run.mode[-1] == Mode.STICK).sum() >= 2
+    crept = replace(run, v=v)
+    assert measured("creep_speed", crept, case, from_run(run, Tier.A, "itself")) == pytest.approx(creep, rel=1e-6)
+
+
 def test_an_instant_that_is_late_is_seen_and_its_jump_is_not() -> None:
     late = 3e-3
     rows = {name: getattr(RUN, name) for name in ("q", "v", "gap", "lam", "energy", "mode")}
