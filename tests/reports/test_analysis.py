@@ -305,10 +305,14 @@ def test_branches_of_a_locus_do_not_jump():
     found = locus(lambda k: model([[0.0, 1.0], [-1.0, -k]], np.ones((2, 1)), np.eye(2)), np.linspace(0.0, 4.0, 401))
     np.testing.assert_allclose(found.poles.sum(axis=1), -found.values, atol=1e-12)
     assert np.abs(np.diff(found.poles, axis=0)).max() < 0.15
-    k = found.values
-    np.testing.assert_allclose(found.growth, -0.5 * k + np.sqrt(np.maximum(0.25 * k * k - 1.0, 0.0)), atol=1e-7)
     with pytest.raises(InvalidValue, match="empty"):
         locus(lambda k: None, [])
+
+
+def test_a_locus_grows_as_the_branch_that_grows_most() -> None:
+    """Of two that cross at k = 2."""
+    found = locus(lambda k: model([[-1.0, 0.0], [0.0, k - 3.0]], np.ones((2, 1)), np.eye(2)), np.linspace(0.0, 4.0, 41))
+    np.testing.assert_allclose(found.growth, np.maximum(-1.0, found.values - 3.0), atol=1e-12)
 
 
 def test_where_a_gain_makes_an_equilibrium_unstable():
