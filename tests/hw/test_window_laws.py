@@ -116,6 +116,21 @@ def test_polynomials_are_their_own_value_rate_and_acceleration(half: int, degree
         assert gain[row] == pytest.approx([sizes[0], sizes[1] / STEP, 2.0 * sizes[2] / STEP**2], rel=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_an_admitted_error_widens_a_band_in_units_of_the_residual(seed: int) -> None:
+    """By its part of what is left of the residual, whatever the unit of the input; of itself by the square of that."""
+    random = np.random.default_rng(seed)
+    u = random.normal(size=500)
+    residual, floor = 0.3 * u + random.normal(size=500), float(random.uniform(0.1, 0.5))
+    unit, other = 10.0 ** random.uniform(-3.0, 3.0, 2)
+    for found, power in ((lambda r, u, f: crosscorrelation(r, u, 8, floor=f), 1),
+                         (lambda r, u, f: autocorrelation(r, 8, floor=f), 2)):  # fmt: skip
+        plain, wide, twice = (found(residual, u, f).band for f in (0.0, floor, 2.0 * floor))
+        assert wide - plain == pytest.approx((floor / residual.std()) ** power, rel=0.1)
+        assert twice - plain == pytest.approx(2.0**power * (wide - plain), rel=1e-9)
+        assert found(unit * residual, other * u, unit * floor).band == pytest.approx(wide, rel=1e-6)
+
+
 def turned(vector: np.ndarray) -> np.ndarray:
     """The matrix of a rotation vector, by Rodrigues."""
     angle = np.linalg.norm(vector)
