@@ -49,8 +49,9 @@ def scale_of(exact: Trajectory, case: Case) -> Floats:
     moves in the truth, by the balance of others, tells of an engine that moves it how far that
     is, and not how still it ought to be. But not by where bodies float, nor by more than a
     radian, what other rotations are measured by: a robot far from the origin, or the turns of a
-    wheel, would hide what a finger does. Where all of these rest, what the case says of their
-    size. Errors below 1e-12, what absolute tolerances are, pass the usual limit of 1e-6.
+    wheel, would hide what a finger does. Of what floats, each body is measured by where it is
+    itself. Where all of these rest, what the case says of their size. Errors below 1e-12, what
+    absolute tolerances are, pass the usual limit of 1e-6.
     """
     own: Floats = np.max(np.abs(exact.q), axis=0)
     smallest = least(case.coordinates)
@@ -64,8 +65,11 @@ def scale_of(exact: Trajectory, case: Case) -> Floats:
 
 def _of_joints(own: Floats, case: Case, scene: Scene) -> Floats:
     """Return what each coordinate (nq,) of a scene is measured by: its own largest, or that of the joints like it."""
-    floats = np.repeat([j.type == "free" for j in scene.joints], [WIDTHS[j.type][0] for j in scene.joints])
+    widths = [WIDTHS[joint.type][0] for joint in scene.joints]
+    floats = np.repeat([joint.type == "free" for joint in scene.joints], widths)
     turns = np.array([coordinate.unit == "rad" for coordinate in case.coordinates])
-    joints, bodies = (of_like(np.where(kind, own, 0.0), case.coordinates) for kind in (~floats, floats))
-    shared = np.where(floats, bodies, np.where(turns, np.minimum(joints, 1.0), joints))
+    joints = of_like(np.where(floats, 0.0, own), case.coordinates)
+    shared = np.where(turns, np.minimum(joints, 1.0), joints)
+    for at in np.cumsum([0, *widths[:-1]])[[joint.type == "free" for joint in scene.joints]]:
+        shared[at : at + 3] = own[at : at + 3].max()
     return np.maximum(own, shared)

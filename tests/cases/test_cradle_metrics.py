@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Event, InvalidValue, Mode, Tier, Trajectory, load
+from crossbody.cases import Case, Event, Inputs, InvalidValue, Mode, Tier, Trajectory, load
 from crossbody.cases.case import CaseMetric
 from crossbody.cases.mechanisms.cradle.claims import row
 from crossbody.cases.mechanisms.cradle.rules import answer
@@ -86,6 +86,9 @@ def test_energy_of_switching_needs_one_stiffness_in_real_time(case: Case) -> Non
     # Row 0 is switched on at h = 1e-4 - 0.9 2e-4, row 1 at h_0 = -1e-4: 1/2 a0 h^2 m (1/2, and 2/3 - 1/2).
     first, second = 0.5e6 * 0.1 * (0.8e-4) ** 2 * 0.5, 0.5e6 * 0.1 * 1e-8 * (2 / 3 - 1 / 2)
     assert measure("energy_switching", still, real) == pytest.approx(first + second, rel=1e-9)
+    pushed = Inputs(names=("force",), times=np.zeros(1), values=np.ones((1, 1)))
+    assert measure("energy_switching", still, replace(real, inputs=pushed)) is None
+    assert measure("energy_switching", replace(still, mode=np.array([[0, 0], [-1, 1]], dtype=np.int8)), real) is None
     unequal = replace(real, law=replace(real.law, a0=np.array([1e6, 2e6])))
     assert measure("energy_switching", still, unequal) is None
 

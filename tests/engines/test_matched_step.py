@@ -8,6 +8,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome
 from crossbody.cases.scene import Body, Joint, Loop, RowLaw, Scene
+from crossbody.engines.mujoco import _model
 
 
 def swinging(seed: int, rate: float) -> Case:
@@ -49,3 +50,19 @@ def test_what_only_decays_is_followed_as_far_as_it_moves(seed: int, rate: float)
     exact = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
     assert moved.outcome is exact.outcome is Outcome.FINISHED
     assert np.abs(moved.q[-1] - exact.q[-1]).max() <= 1e-7
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_mode_that_decays_counts_by_what_a_unit_state_makes_of_it(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its part of positions is what is left of exp(A t) without the other modes, by the inverse of all vectors."""
+    rng, n = np.random.default_rng(seed), 4
+    turn = np.linalg.qr(rng.normal(size=(n, n)))[0]
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), -(turn * 10.0 ** rng.uniform(1.0, 3.0, n)) @ turn.T]])
+    monkeypatch.setattr(_model, "_slopes", lambda *given: A)
+    rates, R = np.linalg.eig(A)
+    inverse = np.linalg.inv(R)
+    moved = [np.abs(np.outer(R[:n, k], inverse[k])).max() for k in range(2 * n)]
+    counts = np.minimum(moved, 1.0) ** 0.25
+    assert counts[np.argmax(np.abs(rates) * counts)] > _model.OF_RATE / _model.STABLE
+    wanted = np.max(np.abs(rates) * counts)
+    assert _model.fastest(Scene(), np.zeros(n), np.zeros(n)) == pytest.approx(wanted, rel=1e-6)

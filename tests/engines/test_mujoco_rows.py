@@ -142,3 +142,33 @@ def test_recorded_gaps_are_those_of_the_shapes_wherever_their_body_has_its_weigh
     run = load("mujoco").prepare(case).run()
     rotation = matrices(run.q[:, 3:])
     assert run.gap[:, 0] == pytest.approx(run.q[:, 2] + (rotation @ place)[:, 2] - 0.05, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("before", "pushes", "spent", "after"),
+    [
+        (Mode.FREE, True, False, Mode.COLLISION), (Mode.FREE, False, False, Mode.BALLISTIC),
+        (Mode.COLLISION, True, False, Mode.COLLISION), (Mode.COLLISION, True, True, Mode.CONTACT),
+        (Mode.COLLISION, False, False, Mode.COLLISION_SEPARATION),
+        (Mode.COLLISION_SEPARATION, True, False, Mode.COLLISION),
+        (Mode.COLLISION_SEPARATION, False, False, Mode.COLLISION_SEPARATION),
+        (Mode.CONTACT, True, False, Mode.CONTACT), (Mode.CONTACT, False, False, Mode.BALLISTIC),
+        (Mode.BALLISTIC, False, False, Mode.BALLISTIC),
+    ],
+)  # fmt: skip
+def test_a_row_with_two_sets_collides_until_it_is_spent(
+    before: Mode, pushes: bool, spent: bool, after: Mode
+) -> None:  # fmt: skip
+    """Each of several for itself, whatever the others do."""
+    case = load_case("red_body", "resolved")
+    assert case.scene is not None
+    model = matched(case.scene)
+    rows = Switched(case.scene, model, mujoco.MjData(model))
+    for row in rows.sets:
+        modes = list(rows.free)
+        modes[row] = int(before)
+        rows.armed = tuple(modes)
+        modes[row] = int(Mode.CONTACT if pushes else Mode.BALLISTIC)
+        found = rows.entered(modes, [row] if spent else [])
+        modes[row] = int(after)
+        assert found == tuple(modes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,7 @@ from rig_data import channels, log_of
 
 from crossbody import hw
 from crossbody.cases import SceneError
+from crossbody.hw.replaying.replay import _shortened
 from crossbody.hw.windows.rates import derivatives, rates_by_fit
 from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way
 from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
@@ -63,6 +65,23 @@ def test_windows_hold_the_rows_from_each_restart_to_its_horizon(seed: int) -> No
     assert overlap([*cut, *cut]) == max(shared)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_a_shortened_window_is_that_of_a_log_that_ends_there(seed: int) -> None:
+    """With inputs and without."""
+    random = np.random.default_rng(seed)
+    log, model = recorded(random), hw.models.load("double_pendulum")
+    if seed % 3 == 0:
+        log = replace(log, channels=tuple(one for one in log.channels if one.role != "inputs"))
+    (whole,) = windows(log, model, restart=0.0)
+    count = int(random.integers(FEWEST + 1, len(log)))
+    (wanted,) = windows(log.window(log.time[0], log.time[count]), model, restart=0.0)
+    found = _shortened(whole, count)
+    for name in ("t", "age", "y", "u"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+    for name in ("y", "yd", "t_end", "times", "inputs"):
+        np.testing.assert_array_equal(getattr(found.segment, name), getattr(wanted.segment, name))
+
+
 def test_a_window_has_eight_samples_and_lies_inside_the_log() -> None:
     log, model = recorded(np.random.default_rng(0)), hw.models.load("double_pendulum")
     (whole,) = windows(log, model, restart=0.0)
@@ -95,6 +114,21 @@ def test_polynomials_are_their_own_value_rate_and_acceleration(half: int, degree
         weights = np.linalg.pinv(np.vander(near / STEP, degree + 1, increasing=True))
         sizes = np.linalg.norm(weights, axis=1)
         assert gain[row] == pytest.approx([sizes[0], sizes[1] / STEP, 2.0 * sizes[2] / STEP**2], rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_admitted_error_widens_a_band_in_units_of_the_residual(seed: int) -> None:
+    """By its part of what is left of the residual, whatever the unit of the input; of itself by the square of that."""
+    random = np.random.default_rng(seed)
+    u = random.normal(size=500)
+    residual, floor = 0.3 * u + random.normal(size=500), float(random.uniform(0.1, 0.5))
+    unit, other = 10.0 ** random.uniform(-3.0, 3.0, 2)
+    for found, power in ((lambda r, u, f: crosscorrelation(r, u, 8, floor=f), 1),
+                         (lambda r, u, f: autocorrelation(r, 8, floor=f), 2)):  # fmt: skip
+        plain, wide, twice = (found(residual, u, f).band for f in (0.0, floor, 2.0 * floor))
+        assert wide - plain == pytest.approx((floor / residual.std()) ** power, rel=0.1)
+        assert twice - plain == pytest.approx(2.0**power * (wide - plain), rel=1e-9)
+        assert found(unit * residual, other * u, unit * floor).band == pytest.approx(wide, rel=1e-6)
 
 
 def turned(vector: np.ndarray) -> np.ndarray:

@@ -52,6 +52,25 @@ def test_ledger_closes_inside_long_steps_of_stiff_rows_too(pole):
         assert np.abs(residual).max() < 10.0 * rtol * run.energy[:, 0].max()
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_ledger_grows_by_the_power_at_every_instant(seed):
+    """Of a force and a fluid, by hand, at samples in pairs inside steps of any method."""
+    rng, rtol, apart, change = np.random.default_rng(seed), 1e-6, 1e-6, 0.503
+    drag, force, start = rng.uniform(0.2, 2.0), 3.0 * rng.normal(size=2), rng.uniform(-1.0, 1.0)
+    system, middle = wall_pendulum(5.0, pole=10.0 ** rng.uniform(3.0, 4.0), drag=drag), np.linspace(0.01, 1.99, 499)
+    run = simulate(
+        system, [np.sin(start), -np.cos(start)], [0.0, 0.0], 2.0, rtol=rtol, ledger=True,
+        samples=np.sort(np.concatenate([middle - apart, middle, middle + apart])),
+        inputs=([0.0, change], force[:, None]),
+    )  # fmt: skip
+    assert run.counts["implicit_steps"] > 10
+    i = np.searchsorted(run.t, middle)
+    powers = np.where(middle < change, *force) * run.v[i, 0], drag * np.sum(run.v[i] ** 2, axis=1)
+    for taken, power in zip((run.ledger.input, run.ledger.dissipated), powers, strict=True):
+        rate = (taken[i + 1] - taken[i - 1]) / (run.t[i + 1] - run.t[i - 1])
+        assert np.abs(rate - power).max() <= 10.0 * rtol * np.abs(power).max()
+
+
 def test_work_of_one_bounce_is_the_law_s():
     # No gravity, linear law: the row takes m v^2 (1 - e^2) / 2.
     system = ball(a0=1e4, a1=40.0, a2=0.0, gravity=0.0)

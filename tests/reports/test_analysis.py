@@ -309,6 +309,12 @@ def test_branches_of_a_locus_do_not_jump():
         locus(lambda k: None, [])
 
 
+def test_a_locus_grows_as_the_branch_that_grows_most() -> None:
+    """Of two that cross at k = 2."""
+    found = locus(lambda k: model([[-1.0, 0.0], [0.0, k - 3.0]], np.ones((2, 1)), np.eye(2)), np.linspace(0.0, 4.0, 41))
+    np.testing.assert_allclose(found.growth, np.maximum(-1.0, found.values - 3.0), atol=1e-12)
+
+
 def test_where_a_gain_makes_an_equilibrium_unstable():
     """A single finger from 5.95 (m/s)/N on, at 724 rad/s; two fingers never. The poles there stand on the axis."""
     family = Family("soft_contact", "axis", {}, {}, "kstar")

@@ -128,6 +128,22 @@ def test_rows_of_throughput_are_ratios_of_their_runs(seed: int, monkeypatch: pyt
     assert table["held"].to_list() == [value >= limit for value, limit in zip(table["value"], limits, strict=True)]
 
 
+def test_mujoco_steps_every_drop_up_to_the_horizon_of_the_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    from mujoco import batch
+
+    made = []
+
+    def kept(*given: Any, **more: Any) -> batch.Batch:
+        made.append(one := real(*given, **more))
+        return one
+
+    real = batch.Batch
+    monkeypatch.setattr(batch, "Batch", kept)
+    throughput.mujoco(3, 1, "RK4")
+    (many,) = made
+    assert many.bind("time").ravel() == pytest.approx([cases.load("bouncing_ball", "listing").t_end] * 3, rel=1e-9)
+
+
 def test_what_is_timed_is_the_motion_of_the_case() -> None:
     """With its inputs, and the collisions that it asks for."""
     for case in (cases.load("delta_impulse", "light", t_end=0.2), cases.load("newtons_cradle", "sliders", gap=1e-3)):

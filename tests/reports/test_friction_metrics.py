@@ -22,6 +22,7 @@ from crossbody.reports import metrics
 from crossbody.reports.measuring import friction
 from crossbody.reports.measuring.friction import rubbing
 from crossbody.reports.measuring.truth import Truth, from_run
+from crossbody.reports.metrics import law_residual
 
 NAMES = (
     "cone_violation", "creep_speed", "friction_angle", "friction_impulse", "friction_power", "friction_work",
@@ -100,6 +101,18 @@ def test_creep_is_the_slip_of_what_holds() -> None:
     kept = {name: getattr(RUN, name)[slides] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")}
     early = replace(RUN, ledger=None, **kept)
     assert measured("creep_speed", early) is None
+
+
+@pytest.mark.parametrize(("low", "high", "creep"), [(1e-3, 6e-3, 5e-3), (3e-3, 4e-3, 3e-3), (-2e-3, 2e-3, 4e-3)])
+def test_the_fastest_creep_of_two_contacts_counts(low: float, high: float, creep: float) -> None:
+    places = [0, 0, 0.1, 1, 0, 0, 0, 0, 0, 0.3, 1, 0, 0, 0]
+    case = case_of(stack(0.5, 0.5), q0=places, t_end=0.1)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    v = run.v.copy()
+    v[-1, 0], v[-1, 6] = low, high
+    assert (run.mode[-1] == Mode.STICK).sum() >= 2
+    crept = replace(run, v=v)
+    assert measured("creep_speed", crept, case, from_run(run, Tier.A, "itself")) == pytest.approx(creep, rel=1e-6)
 
 
 def test_an_instant_that_is_late_is_seen_and_its_jump_is_not() -> None:
@@ -201,6 +214,19 @@ def test_slip_is_counted_from_the_surface(drift: float, monkeypatch: pytest.Monk
     assert found is not None
     np.testing.assert_allclose(found.slip[:, 0, 0], run.v[:, 0] - drift, atol=1e-14)
     np.testing.assert_array_equal(found.mu, 0.2)
+
+
+@pytest.mark.parametrize("drift", [-0.1, 0.1])
+def test_what_sticks_to_a_belt_follows_the_law_over_the_belt(drift: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    system = point(0.3, 0.0, spring=[100.0, 0.0], drift=drift)
+    run = simulate(system, [0.0, 0.0], [0.9 * drift, 0.0], 0.2, samples=np.linspace(0.0, 0.2, 101))
+    assert (run.mode[:, 0] == Mode.STICK).any()
+    law = replace(CASE.law, a0=system.a0, a1=system.a1, a2=np.zeros(2), b0=np.zeros(2), b1=np.zeros(2),
+                  unilateral=np.ones(2, dtype=np.bool_))  # fmt: skip
+    for module in (friction, law_residual):
+        monkeypatch.setattr(module, "equations", lambda case: system)
+    case = replace(CASE, scene=None, law=law, inputs=None, contacts=("normal", "along"))
+    assert measured("law_residual", run, case, from_run(run, Tier.A, "itself")) < 1e-9
 
 
 def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_path: Path) -> None:

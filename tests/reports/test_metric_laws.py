@@ -13,17 +13,23 @@ import numpy as np
 import pytest
 from drawn_motions import CASES, Drawn, N
 
-from crossbody.cases import Mode, Trajectory
+from crossbody.cases import Case, Mode, Tier, Trajectory, from_scene
 from crossbody.cases.arrays import Floats
+from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.impulse import told
+from crossbody.reports.measuring.truth import from_run
 
 
 @pytest.fixture(scope="module", params=[(*case, seed) for case in CASES for seed in range(2)], ids=str)
 def one(request: pytest.FixtureRequest) -> Drawn:
     return Drawn(*request.param)
+
+
+NEAR = ("gap_error", "position")
+"""Metrics that take each body, or each row, for itself."""
 
 
 def largest_of_like(values: Floats, units: Sequence[str]) -> Floats:
@@ -57,9 +63,8 @@ def test_positions_are_off_by_the_part_of_the_largest_of_each(one: Drawn) -> Non
         scale = own[j]
         if case.scene is not None and not case.quaternions:  # joints, which are measured by the largest of their like
             scale = max(scale, min(1.0 if unit == "rad" else np.inf, largest_of_like(own, units)[j]))
-        elif case.quaternions:  # bodies that float
-            others = [o for i, o in enumerate(own) if not any(a <= i < a + 4 for a in case.quaternions)]
-            scale = max(others)
+        elif case.quaternions:  # bodies that float, each by where it is itself
+            scale = own[j - j % 7 : j - j % 7 + 3].max()
         parts.append(np.abs(one.run.q[:k, j] - exact.q[:k, j]).max() / scale)
     assert one.measured("position") == pytest.approx(max(parts), rel=1e-6)
 
@@ -91,14 +96,63 @@ def test_energies_are_off_by_the_part_of_the_largest(one: Drawn) -> None:
 def test_gaps_are_those_of_rows_that_open_or_of_those_that_do_not(one: Drawn) -> None:
     k, run, exact, opens = one.trusted, one.run, one.exact, one.case.law.unilateral
     deep, deep_exact = np.minimum(run.gap[:, opens], 0.0), np.minimum(exact.gap[:, opens], 0.0)
-    names = ("constraint_drift", "penetration", "penetration_error", "gap_error")
+    names = ("constraint_drift", "penetration", "penetration_error")
     wanted = {} if opens.all() else {"constraint_drift": np.abs(run.gap[:, ~opens]).max()}
     if opens.any():
         wanted["penetration"] = -deep.min()
         wanted["penetration_error"] = np.abs(deep[:k] - deep_exact[:k]).max() / -deep_exact.min()
-        wanted["gap_error"] = np.abs(run.gap - exact.gap)[:k, opens].max() / np.abs(exact.gap[:, opens]).max()
+        off, own = np.abs(run.gap - exact.gap)[:k, opens].max(axis=0), np.abs(exact.gap[:, opens]).max(axis=0)
+        assert (off / own.max()).max() * (1.0 - 1e-9) <= one.measured("gap_error") <= (off / own).max() * (1.0 + 1e-9)
     found = {name: value for name in names if (value := one.measured(name)) is not None}
     assert found == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_body_far_away_hides_nothing_of_a_near_one(seed: int) -> None:
+    """Neither of its gaps nor of its positions, however far the other is and moves."""
+    random, t = np.random.default_rng(seed), np.linspace(0.0, 1.0, 40)
+    far = 10.0 ** random.uniform(2.0, 4.0) * random.choice([-1.0, 1.0], 3)
+    ways = 0.3 * np.sin(np.multiply.outer(t, random.uniform(1.0, 9.0, 6)) + random.uniform(0.0, 6.0, 6))
+    off = 1e-4 * random.normal(size=(40, 3))
+    found = {}
+    for bodies in (("near",), ("near", "far")):
+        case = balls(bodies)
+        places = [ways[:, :3], ways[:, 3:] + far][: len(bodies)]
+        turn = np.tile([1.0, 0.0, 0.0, 0.0], (40, 1))
+        exact, run = (
+            still(
+                case, t, np.hstack([one for k, place in enumerate(places) for one in (place + more * (k == 0), turn)])
+            )
+            for more in (0.0, off)
+        )
+        gap, truth = run.gap.copy(), from_run(exact, Tier.A, "drawn")
+        gap[:, 0] += off[:, 0]
+        run = replace(run, gap=gap)
+        found[bodies] = [metrics.load(name).measure(truth, run, case) for name in NEAR]
+    assert found["near", "far"] == pytest.approx(found["near",], rel=1e-6)
+    assert min(found["near",]) > 1e-5
+
+
+def balls(names: Sequence[str]) -> Case:
+    """Of radius 0.1 m, that float above a floor."""
+    floor = Shape(name="floor", body="", type="plane", size=(0.0, 0.0, 0.0))
+    return from_scene(Scene(
+        bodies=tuple(Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)) for name in names),
+        joints=tuple(Joint(name=name, body=name, type="free") for name in names),
+        shapes=(floor, *(Shape(name=name, body=name, type="sphere", size=(0.1, 0.0, 0.0)) for name in names)),
+        pairs=tuple(Pair(name=name, first="floor", second=name) for name in names),
+    ), q0=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0] * len(names), t_end=1.0)  # fmt: skip
+
+
+def still(case: Case, t: Floats, q: Floats) -> Trajectory:
+    """Positions and their gaps, with nothing else."""
+    system = equations(case)
+    assert system is not None
+    v, rows = np.zeros((len(t), system.n)), np.zeros((len(t), system.nc))
+    return Trajectory(
+        t=t, q=q, v=v, gap=system.gaps_along(q, v)[0], lam=rows, energy=np.zeros((len(t), 2)), steps=len(t),
+        mode=np.full(rows.shape, Mode.FREE, np.int8), events=(),
+    )  # fmt: skip
 
 
 def test_multipliers_are_off_by_the_part_of_the_largest(one: Drawn) -> None:

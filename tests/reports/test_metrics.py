@@ -17,6 +17,7 @@ from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.friction import cumulated
 from crossbody.reports.measuring.impulse import cumulative
+from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, before, from_run, sample_times
 
@@ -200,6 +201,13 @@ def test_a_run_can_be_the_truth(truth: Truth, case: Case) -> None:
     times = sample_times(truth.trajectory, case.t_end, grid=777)
     assert np.abs(recorded.at(times).q - truth.at(times).q).max() < 1e-7
     assert measure("position", recorded, truth.at(times), case) < 1e-7
+
+
+def test_modes_that_a_run_does_not_tell_are_not_looked_at(truth: Truth, case: Case) -> None:
+    mode = truth.trajectory.mode.copy()
+    mode[len(mode) // 2] = -1
+    assert violated(case, truth.trajectory, 1e-9) == ()
+    assert violated(case, replace(truth.trajectory, mode=mode), 1e-9) is None
 
 
 def test_sample_times_hold_both_sides_of_every_event(truth: Truth, case: Case) -> None:

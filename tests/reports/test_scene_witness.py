@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from random_scenes import random_scene, random_state
 
-from crossbody.cases import Case, EngineUnavailable
+from crossbody.cases import Case, EngineUnavailable, Outcome
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.reference.tree import system as tree
@@ -61,6 +62,31 @@ def test_a_wrong_tree_is_seen(wrong: Callable[[Scene], Scene], arm: Case, monkey
     monkeypatch.setattr(judging, "_witness", lambda *_: "left out")  # a solver of the same equations has the same fault
     (blind,) = truth_row(arm, judging.truth_of(arm), "")
     assert blind.verdict == Word.WITHIN
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_witness_is_given_as_many_steps_as_its_time_allows(
+    seed: int, arm: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    """At the pace of its first part, a twentieth of the whole, of which the time was measured."""
+    rng = np.random.default_rng(seed)
+    first, steps, limit = (
+        float(rng.uniform(0.5, 1.0)),
+        int(rng.integers(10_000, 20_000)),
+        float(rng.uniform(25.0, 90.0)),
+    )
+    given = []
+
+    def prepare(case: Case, profile: str, **settings: Any) -> Any:
+        given.append((case.t_end, settings))
+        return SimpleNamespace(run=lambda: SimpleNamespace(outcome=Outcome.FINISHED))
+
+    monkeypatch.setattr("crossbody.engines.load", lambda name: SimpleNamespace(prepare=prepare))
+    monkeypatch.setattr(judging, "estimated", lambda *_: (20.0 * first, steps))
+    judging._witness(arm, limit)
+    ((t_end, settings),) = given
+    assert t_end == arm.t_end
+    assert settings["max_steps"] == pytest.approx(limit / (first / steps), rel=1e-3)
 
 
 def test_where_there_is_no_witness_the_truth_says_why(arm: Case, monkeypatch: pytest.MonkeyPatch) -> None:
