@@ -59,10 +59,14 @@ BESIDE = MEASURED + FUNCTIONS_MOST  # and beside a gap its slopes, beside the ra
 
 @compiled
 def sign(row: Array, j: int) -> int:
-    """How function j of an interval lies to zero, as far as its bounds tell."""
+    """How function j of an interval lies to zero, as far as its bounds tell.
+
+    Of one that falls through it one coefficient at most may be open, and only if it is below the one before for sure:
+    g is none of a polynomial's, so that what it leaves open may rise again.
+    """
     at = j * NODES
     g = row[BOUNDS + j]
-    fallen, again, lowest, highest = 0, False, 0, 0
+    fallen, again, lowest, highest, before = 0, False, 0, 0, np.inf
     for k in range(NODES + 1):
         value = 0.0
         for c in range(NODES):
@@ -73,7 +77,9 @@ def sign(row: Array, j: int) -> int:
         highest += high
         if not low:
             fallen += 1
-        again = again or (fallen > 0 and low) or (fallen > 1 and not high)  # one coefficient at most may be open
+        open_ = not (low or high) and (fallen > 1 or value + margin > before)
+        again = again or (fallen > 0 and low) or open_
+        before = value + margin
     if lowest == NODES + 1:
         return ABOVE
     if highest == NODES + 1:

@@ -23,6 +23,7 @@ from crossbody.reference.core.enclosure import (
     BETWEEN,
     BOUNDS,
     HALVE,
+    HERE,
     HULL,
     MEASURED,
     NOWHERE,
@@ -53,6 +54,7 @@ from crossbody.reference.kinds import Array, Bytes
 FIRST = 0.125  # part of g that is left in the first halves; then what was left before, but at least
 LEFT = 0.5**NODES  # what is left of it where the function is smooth
 GAP_LEVELS = 4  # halvings down to which a rate is held against its gap; below, what the step may be off by counts
+LOOKED = 1  # halvings before a gap is believed: in a long step its slopes may fit, and it be sharp between the places
 INTERVALS = 2000  # of one search; then halving ends, and places decide
 
 
@@ -253,6 +255,8 @@ def first_below(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: in
         if not all_finite(row[: count * NODES]):
             return np.nan
         verdict = judge(row, count)
+        if verdict == HERE and level < LOOKED and scale != 0.0:
+            verdict = HALVE
         if verdict == HALVE and level < WINDOW_LEVELS - 1 and seen < INTERVALS:
             level, place = level + 1, 2 * place
         else:

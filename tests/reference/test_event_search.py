@@ -329,3 +329,53 @@ def test_an_interval_holds_an_event_if_no_function_is_open_and_not_if_one_stays_
         seen = set(lies[:count].tolist())
         wanted = enclosure.HALVE if enclosure.MIXED in seen else enclosure.HERE
         assert enclosure.judge.py_func(row, count) == (enclosure.NOWHERE if enclosure.ABOVE in seen else wanted)
+
+
+@kernels.dynamics
+def _thrown(t, q, v, u, p, M, f, w):
+    for i in range(2):
+        M[i, 0], f[i] = 1.0, p[i]
+
+
+@kernels.gaps
+def _ring_gap(t, q, v, p, h, hd):
+    r = np.sqrt(q[0] * q[0] + q[1] * q[1])
+    h[0], hd[0] = 1.0 - r, -(q[0] * v[0] + q[1] * v[1]) / r
+
+
+@kernels.rows
+def _ring_row(t, q, v, p, w, idx, na, H, h, Hdv):
+    r = np.sqrt(q[0] * q[0] + q[1] * q[1])
+    for j in range(na):
+        H[j, 0], H[j, 1] = -q[0] / r, -q[1] / r
+        along = (q[0] * v[0] + q[1] * v[1]) / r
+        h[j], Hdv[j] = 1.0 - r, -(v[0] * v[0] + v[1] * v[1] - along * along) / r
+
+
+def _touches(seed: int, **options: float) -> list[float]:
+    """When a point that is thrown about in a ring first meets it."""
+    rng = np.random.default_rng(seed)
+    pull = rng.normal(size=2) * 10 ** rng.uniform(-2, 1)
+    made = System(
+        n=2, mass_block=1, dynamics=_thrown, gaps=_ring_gap, rows=_ring_row, parameters=pull,
+        a0=[10 ** rng.uniform(3, 5)], a1=[10 ** rng.uniform(1, 2.8)], unilateral=[True],
+    )  # fmt: skip
+    start, speed = rng.normal(size=2) * 0.3, rng.normal(size=2) * 10 ** rng.uniform(-1, 0.5)
+    run = simulate(made, start, speed, 60.0, rtol=1e-9, max_steps=20_000, **options)
+    return [e.t for e in run.events if e.before is Mode.FREE][:3]
+
+
+@pytest.mark.parametrize("seeds", [[210], range(40), pytest.param(range(40, 300), marks=pytest.mark.slow)], ids=str)
+def test_a_long_flight_meets_a_ring_as_short_steps_do(seeds):
+    """Steps of a flight have no errors, and grow as long as the run; from its ends a ring looks like a line."""
+    for seed in seeds:
+        assert _touches(seed) == pytest.approx(_touches(seed, max_step=0.02), abs=1e-4), seed
+
+
+def test_a_ball_that_hops_at_the_start_of_a_long_flight_leaves_its_ring():
+    """It rises by 35 um for 31 ms, in a step of 17 s."""
+    case = cases.load("ball_maze", "outside", t_end=21.0)
+    run = engines.load("reference").prepare(case, rtol=1e-11, samples=np.linspace(4.2, 4.4, 201)).run()
+    passing = run.mode[:, 0] == Mode.BALLISTIC
+    assert passing.any()
+    assert run.gap[passing, 0].max() < 1e-9
