@@ -23,7 +23,7 @@ from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.compiled.evaluation import LIFTED, Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
-from crossbody.reference.sundials.sharing import CONSISTENT, Sharing, allowed, rank, share
+from crossbody.reference.sundials.sharing import CONSISTENT, Sharing, parted, rank, share
 
 SLOW, DEEP = 1e-9, 1e-9
 TOUCH = 64.0 * ULP  # of the largest position, at least 1: a gap this small is closed
@@ -31,7 +31,6 @@ SAME_INSTANT = 8.0 * ULP
 CLOSE = 1e-12  # part of the time within which rows of one body let go together
 SIDES = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))  # |x| + |y| <= z: so for each choice of signs
 SAME_CHANGE = 1e-9  # part by which changes of v' may differ and count as equal
-PARTED = 4.0  # times what rows may be off their laws where it is decided which of them hold the others
 
 
 class Watch(IntEnum):
@@ -113,6 +112,7 @@ class LevelMachine:
         self._one_by_one = self._alone = False
         self.guards: list[Guard] = []
         self.sharing: Sharing | None = None
+        self._kept: Sharing | None = None
         self.spent: set[int] = set()
         self._all_spent, self._shared = set[int](), -np.inf
         self.tied: dict[int, float] = {}
@@ -219,26 +219,25 @@ class LevelMachine:
 
         But not just after it was lifted off, or rounding would choose where a load is about to leave a row.
         """
-        terms, (a0, a1, _) = self._law(i, t, q, v), self.equations.law[i]
-        open_for = (t - self.tied[i]) * max(a0**0.5, a1)
-        band = CONSISTENT * np.abs(terms).sum()
-        return float((band if open_for > LIFTED else -band) - terms.sum())
-
-    def _law(self, i: int, t: float, q: Floats, v: Floats) -> Floats:
-        """The terms of row i's law while the active rows follow theirs, m/s^2."""
         e = self.equations
         vd, _ = e.accelerate(t, q, v)
         with e._selected([i]):
             H, h, Hdv = e.rows(t, q, v)
             a0, a1, a2 = e.law[i]
-            return np.array([H[0] @ vd, Hdv[0], a1 * (H[0] @ v), (a0 + a2 * h[0] ** 2) * h[0]])
+            terms = np.array([H[0] @ vd, Hdv[0], a1 * (H[0] @ v), (a0 + a2 * h[0] ** 2) * h[0]])
+        open_for = (t - self.tied[i]) * max(a0**0.5, a1)
+        band = CONSISTENT * np.abs(terms).sum()
+        return float((band if open_for > LIFTED else -band) - terms.sum())
 
     def contradicts(self, t: float, q: Floats, v: Floats) -> bool:
         """Whether rows that share the load of others cannot follow their laws with these any more."""
-        if self.sharing is None or not self.sharing.beside:
+        if self.sharing is None or not self.sharing.beside or self.sharing == self._kept:
             return False
-        off = np.array([self._law(i, t, q, v).sum() for i in self.sharing.beside])
-        return bool((np.abs(off) > PARTED * allowed(self.equations, t, q, v, self.sharing.beside)).any())
+        vd, _ = self.equations.accelerate(t, q, v)
+        if not parted(self.equations, t, q, v, self.sharing.beside, vd.copy()):
+            return False
+        self._kept = self.sharing  # if that is what is decided again, nothing else is to come of it
+        return True
 
     def _presses(self, i: int, h: float, t: float, q: Floats, v: Floats) -> bool:
         """Whether row i would push if it were active now."""

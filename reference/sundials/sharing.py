@@ -24,6 +24,7 @@ RANK = 1e-5  # singular value of the rows, scaled to length one, over the larges
 NOTHING = 1e-9  # part of the largest multiplier below which a row carries nothing
 PULL = 1e-12  # part of the largest multiplier below which one that is negative is rounding
 CONSISTENT = 1e-9  # part of its terms by which a row may be off its law
+PARTED = 4.0  # times that: what is decided at an instant is decided anew
 STATE = 64.0 * ULP
 
 
@@ -76,7 +77,8 @@ class _Rows:
     """The rows of one instant in the metric of M, each scaled to length one.
 
     Attributes:
-        A (m, n): H L^-T, M = L L^T.
+        root (n, n): L, M = L L^T.
+        A (m, n): H L^-T.
         least (m,): what A y must be at least, y = L^T v'.
         allowed (m,): by how much it may be off.
         free (n,): y of free bodies.
@@ -87,7 +89,7 @@ class _Rows:
         with e._selected(rows):
             M, f = (x.copy() for x in e.terms(t, q, v))
             H, h, Hdv = (x.copy() for x in e.rows(t, q, v))
-        root = np.linalg.cholesky(M)
+        self.root = root = np.linalg.cholesky(M)
         a0, a1, a2 = e.law[rows].T
         rate, spring = H @ v, (a0 + a2 * h * h) * h
         self.A, self.free = np.linalg.solve(root, H.T).T, np.linalg.solve(root, f)
@@ -101,11 +103,12 @@ class _Rows:
         self.allowed = (CONSISTENT * terms + state) / self.length
 
 
-def allowed(e: Equations, t: float, q: Floats, v: Floats, rows: list[int]) -> Floats:
-    """By how much rows in contact may be off their laws where some depend on others, m/s^2."""
+def parted(e: Equations, t: float, q: Floats, v: Floats, rows: list[int], vd: Floats) -> bool:
+    """Whether v' (n,) has rows off their laws by clearly more than they may be where some depend on others."""
     at = _Rows(e, t, q, v, rows)
-    found: Floats = at.allowed * at.length
-    return found
+    y = at.root.T @ vd
+    rounding = ROUNDING * (np.linalg.norm(at.free) + np.linalg.norm(y - at.free))
+    return bool((np.abs(at.A @ y - at.least) > PARTED * (at.allowed + rounding)).any())
 
 
 def share(
