@@ -12,7 +12,7 @@ from crossbody.cases.case import Case, Limit
 TOLERANCE = 1e-9
 """For which limits on errors are: where a looser one is asked for, they are wider by as much."""
 _TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from event to event"
-_FASTER = "of the tolerance, times the ratio of the fastest rate to the motion's"
+_FASTER = "a thousand times the default tolerance of 1e-9, times the ratio of the fastest rate to the motion's"
 _IDENTITY = "an identity at every sample: rounding"
 _COUNT = "a count"
 _ON_THE_GRID = "impacts on the grid of the steps: the way of one of them"

@@ -251,17 +251,18 @@ def _all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 @compiled
 def _jams(K: Any, s: Any, m: Model, w: Work, b: Buffers, near: float) -> bool:
-    """Whether contacts that slide jam, or come as `near` to it; it marks these.
+    """Whether contacts that slide jam, or come as `near` to it; it marks these, and leaves other marks where none does.
 
     Before they jam their forces grow without bound, so that no step is short enough, unless what drives them vanishes
     as well.
     """
     nq, found, marks = s.nq, False, b.history[len(b.history) - 1]
-    marks[:] = 0
     if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
         for i in range(s.nc):
             slides = has_friction(m, i) and b.mode[i] == SLIP and not is_dry(m, i)
             if slides and ask(DETERMINANT, s, m, w, i) < near:
+                if not found:
+                    marks[:] = 0
                 marks[i], found = 1, True
     return found
 

@@ -60,6 +60,15 @@ def test_a_wider_limit_of_one_engine_is_needed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", cases.names())
+def test_a_reason_reads_alone(name: str) -> None:
+    """It stands behind a number and a limit in the terminal: what follows on a word left out says nothing there."""
+    for variant in cases.variants(name):
+        for limit in limits_of(cases.load(name, variant)):
+            assert limit.known or limit.why, limit
+            assert limit.why.split(" ")[0] not in ("of", "to", "by", "than", "times"), limit
+
+
+@pytest.mark.parametrize("name", cases.names())
 def test_a_property_that_leaves_a_stored_run_without_a_number_does_so_with_any_parameters(name: str) -> None:
     """Where nothing is stored a missing number would be outside; of the stored run it is a known deviation."""
     for variant in cases.variants(name):
