@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from crossbody.reports.judging.verdict import unit_text
-
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -35,6 +33,11 @@ def told(text: str, indent: int = 4) -> str:
     if not sys.stdout.isatty():
         return text
     return textwrap.fill(text, columns(), subsequent_indent=" " * indent, break_on_hyphens=False)
+
+
+def unit_text(unit: str, form: str = " {}") -> str:
+    """How a unit stands beside its number; nothing for ratios and counts."""
+    return "" if unit in ("", "1") else form.format(unit)
 
 
 def laid_out(

@@ -234,19 +234,13 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 @compiled
 def _all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Whether contacts jam that let go in turn, if none or if all of them press; it marks these.
-
-    Without one that lets go what is left may jam, though all together do not: it would close, and pulls if it does not.
-    """
-    for press in range(2):
-        for i in range(s.nc):
-            closes = has_friction(m, i) and not is_dry(m, i) and w.gap[i] <= 0.0 and w.rate[i] < 0.0
-            if closes and (b.mode[i] == BALLISTIC or w.hit[i] <= s.theta):
-                b.mode[i] = active_mode(s, m, w, i) if press else BALLISTIC
-        activate(s, m, w, b.mode)
-        if _jams(K, s, m, w, b, 0.0):
-            return True
-    return False
+    """Whether contacts that let go in turn would jam if all pressed that close; it marks these."""
+    for i in range(s.nc):
+        closes = has_friction(m, i) and b.mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
+        if closes and not is_dry(m, i):
+            b.mode[i] = active_mode(s, m, w, i)
+    activate(s, m, w, b.mode)
+    return bool(_jams(K, s, m, w, b, 0.0))
 
 
 @compiled
@@ -285,7 +279,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             s.method = EXPLICIT
         before = s.method
         code = stepping.attempt(K, s, m, w, b)
-    if code in (STEP_TOO_SMALL, NOT_FINITE) or (code == ILL_POSED and not s.loops):
+    if code in (STEP_TOO_SMALL, NOT_FINITE, ILL_POSED):
         return _stuck(K, s, m, w, b, code)
     if code != 0:
         return code

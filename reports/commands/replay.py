@@ -17,7 +17,8 @@ from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import layout, voice
 from crossbody.reports.commands.shared import identity, print_rows, where
 from crossbody.reports.figures.section import records
-from crossbody.reports.judging.verdict import Word, exit_code, unit_text
+from crossbody.reports.judging.verdict import Word, exit_code
+from crossbody.reports.layout import unit_text
 from crossbody.reports.pages import site as page
 from crossbody.reports.replay import comparison, kept
 from crossbody.reports.replay import comparison as replay

@@ -12,7 +12,8 @@ import click
 from crossbody.reports import layout, voice
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, runs_of, sentence
-from crossbody.reports.judging.verdict import Regression, Row, Word, unit_text
+from crossbody.reports.judging.verdict import Regression, Row, Word
+from crossbody.reports.layout import unit_text
 from crossbody.reports.pages import html
 from crossbody.reports.pages.results import Times
 

@@ -102,11 +102,6 @@ COLUMNS = {name: float if kind == "float" else str for name, kind in Verdict.__a
 """What a table of verdicts holds."""
 
 
-def unit_text(unit: str, form: str = " {}") -> str:
-    """How a unit stands beside its number; nothing for ratios and counts."""
-    return "" if unit in ("", "1") else form.format(unit)
-
-
 def limit_for(limits: Sequence[Limit], metric: str, engine: str, profile: str) -> Limit | None:
     """The most precise limit of a run, of equals the last; with the property shown in any metric."""
 

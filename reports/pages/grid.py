@@ -10,7 +10,8 @@ from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import runs_of, share
-from crossbody.reports.judging.verdict import Row, Word, unit_text
+from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.layout import unit_text
 from crossbody.reports.pages.html import bounded, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.judging.verdict import unit_text
+from crossbody.reports.layout import unit_text
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Replay"

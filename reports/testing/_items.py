@@ -11,7 +11,8 @@ import pytest
 from crossbody.cases import Case, installed
 from crossbody.cases.defaults import limits_of
 from crossbody.cases.loading import OF_USERS
-from crossbody.reports.judging.verdict import Verdict, Word, unit_text
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.layout import unit_text
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.testing import plugin
 from crossbody.reports.testing._bench import Bench
