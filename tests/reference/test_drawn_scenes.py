@@ -11,7 +11,7 @@ from crossbody.cases import Outcome
 BLOCK, BLOCKS = 50, 40
 LEFT_OUT = {
     10_000: "rolls on a rim for ten seconds of processor time",
-    11_877: "its motion is determined up to .233 s; at .436 s a contact that sticks with others has 1.4 times its bound",
+    11_877: "is determined up to .233 s; at .436 s a contact that sticks with others bears 1.4 times its bound",
 }
 WENT_ASTRAY = {
     "frictionless corners beside joints that rub": (10014, 10104, 10293, 10343, 10346, 10362, 11157, 11638, 11665),
