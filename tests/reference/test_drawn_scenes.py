@@ -11,6 +11,7 @@ from crossbody.cases import Outcome
 BLOCK, BLOCKS = 50, 40
 LEFT_OUT = {
     10_000: "rolls on a rim for ten seconds of processor time",
+    11_613: "a sliding contact pulls in one row, 83 us before the jam up to which its motion is determined",
     11_877: "is determined up to .233 s; at .436 s a contact that sticks with others bears 1.4 times its bound",
 }
 WENT_ASTRAY = {
