@@ -25,8 +25,8 @@ from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_set import (
     ahead,
+    apart,
     aside,
-    contradiction,
     evaluate_set,
     first_row,
     jammed,
@@ -47,7 +47,7 @@ WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 def _worst(s: Any, m: Model, w: Work) -> int:
     """The contact that violates its mode most, -1 if none does; w.wants has the modes that all would rather have."""
     found, most = -1, decided_to(s)
-    contradict = s.dependent_rows > 0 and contradiction(s, w, w.full, w.load) > 1.0
+    contradict = s.dependent_rows > 0 and apart(s, w) > 1.0
     for j in range(s.na):
         i = w.idx[j]
         if not is_decided(w, i):

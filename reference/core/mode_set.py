@@ -125,14 +125,18 @@ def _exceed(s: Any, w: Work, r: Array, la: Array) -> None:
 @compiled
 def contradiction(s: Any, w: Work, r: Array, la: Array) -> float:
     """By how many times what is allowed the normal rows that are solved for are off r under the multipliers la."""
+    _exceed(s, w, r, la)
+    return apart(s, w)
+
+
+@compiled
+def apart(s: Any, w: Work) -> float:
+    """By how many times what is allowed the normal rows that are solved for move otherwise than they must: w.excess."""
     allow(s, w, w.y[: s.nq], w.y[s.nq :])
     most = 0.0
     for a in range(s.normals):
         j = w.unknown[a]
-        total = -r[j]
-        for c in range(s.na):
-            total += w.gram[j, c] * la[c]
-        most = max(most, abs(total) / w.allowed[j] if total != 0.0 else 0.0)
+        most = max(most, abs(w.excess[j]) / w.allowed[j] if w.excess[j] != 0.0 else 0.0)
     return float(most)
 
 
