@@ -16,6 +16,7 @@ from crossbody.reference.core.acceleration import OWN, accelerate, is_active, sc
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
 from crossbody.reference.core.friction import (
+    JAMS,
     NOTHING,
     TURNS_ASIDE,
     WATCH,
@@ -213,6 +214,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     any_gap, any_multiplier, watched = False, False, s.watched
     s.watched = 0
     hit, kind, unilateral, follows = w.hit, w.kind, m.unilateral, m.follows
+    s.jammed = s.frictional and s.na > 0 and ask(JAMS, s, m, w, NOTHING) > 0.0
     for i in range(s.nc):
         hit[i] = NEVER
         kind[i] = NONE

@@ -166,8 +166,8 @@ def row_may_switch(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
         return not (_presses_on(s, w, i) and _stays_elastic(s, w, i))
     if mode[i] == STICK:
         return not ((is_dry(m, i) or _presses_on(s, w, i)) and ask(HOLDS_ON, s, m, w, i) > 0.0)
-    if mode[i] == SLIP:  # near a jam its multiplier grows without bound
-        return not ((is_dry(m, i) or _presses_on(s, w, i)) and _slides_on(s, m, w, i))
+    if mode[i] == SLIP:  # near a jam its multiplier may grow without bound, but need not
+        return s.jammed or not ((is_dry(m, i) or _presses_on(s, w, i)) and _slides_on(s, m, w, i))
     return mode[i] != CONTACT or not _presses_on(s, w, i)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.complete import RANK, factor_complete
-from crossbody.reference.core.friction import is_tangent
+from crossbody.reference.core.friction import has_friction, is_dry, is_tangent
 from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.core.unknowns import fill
 from crossbody.reference.kinds import Bytes, Floats, Index
@@ -115,3 +115,19 @@ def determinant(s: Any, m: Model, w: Work, j: int) -> float:
         return -JAMMED
     w.seen[:] = 0
     return _signed_product(w.first, rank, w.down, w.across, w.seen) - JAMMED
+
+
+@compiled
+def any_jam(s: Any, m: Model, w: Work) -> bool:
+    """Whether contacts that slide have passed a jam, by the rows last factored.
+
+    Their forces need not tell: they may stay as they are but for an instant that no stage of a step meets.
+    """
+    known = False
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and w.slides[i] and not is_dry(m, i) and not (known and w.reached[j]):
+            if determinant(s, m, w, j) < 0.0:
+                return True
+            known = True
+    return False

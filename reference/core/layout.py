@@ -166,6 +166,7 @@ STATE = np.dtype(
         ("not_searched", "i8"),  # instants at which there were too many sets to see whether another was
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("jam", "i8"),  # contacts have just come to where they jam together
+        ("jammed", "i8"),  # contacts that slide have passed a jam in the step just taken
         ("pressed_in", "i8"),  # a contact that jams in a set that was tried, -1 if none does
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding
         (
