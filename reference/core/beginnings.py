@@ -77,6 +77,8 @@ def turn(s: Any, m: Model, w: Work) -> float:
             w.along[c + 1] * np.cos(by) + w.along[c] * np.sin(by),
         )
         size = np.sqrt(x * x + y * y)
+        if not size > 0.0:  # no force held it, so that none has a direction
+            continue
         w.along[c], w.along[c + 1] = x / size, y / size
         w.way[w.idx[c]], w.way[w.idx[c + 1]] = x / size, y / size
     return float(most)

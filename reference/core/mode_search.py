@@ -28,6 +28,7 @@ from crossbody.reference.core.mode_set import (
     apart,
     aside,
     evaluate_set,
+    face_against,
     first_row,
     jammed,
     keep,
@@ -83,9 +84,7 @@ def _worst(s: Any, m: Model, w: Work) -> int:
 def change(m: Model, w: Work, i: int, becomes: int) -> None:
     """Put contact i in another mode; one that begins to slide does so against the force that held it."""
     if becomes == SLIP and w.stands[i]:
-        size = size_along(m, w, i, w.la)
-        for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
-            w.way[w.idx[c]] = -w.la[c] / size
+        face_against(m, w, i, w.la)
     put(m, w, i, becomes)
 
 
@@ -167,12 +166,8 @@ def _relax(s: Any, m: Model, w: Work, j: int) -> None:
 @compiled
 def aim(m: Model, w: Work, i: int) -> None:
     """Take the direction against its force for that in which contact i would slide, or that in which it is driven."""
-    force, drive = size_along(m, w, i, w.la), size_along(m, w, i, w.bare)
-    for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
-        if force > 0.0:
-            w.way[w.idx[c]] = -w.la[c] / force
-        elif drive > 0.0:
-            w.way[w.idx[c]] = -w.bare[c] / drive
+    if not face_against(m, w, i, w.la):
+        face_against(m, w, i, w.bare)
 
 
 @compiled

@@ -150,6 +150,15 @@ def size_along(m: Model, w: Work, i: int, x: Array) -> float:
 
 
 @compiled
+def face_against(m: Model, w: Work, i: int, x: Array) -> bool:
+    """Take the direction against x for that in which contact i slides, none if x vanishes there."""
+    size = size_along(m, w, i, x)
+    for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
+        w.way[w.idx[c]] = -x[c] / size if size > 0.0 else 0.0
+    return bool(size > 0.0)
+
+
+@compiled
 def ahead(m: Model, w: Work, i: int) -> float:
     """Tangential acceleration of contact i along its direction."""
     total = 0.0

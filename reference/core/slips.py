@@ -46,7 +46,7 @@ def _face(m: Model, w: Work, i: int, rate: Array) -> None:
     """Take the direction of the present slip velocity of contact i for that of reference."""
     size = slip(m, w, i, rate)
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
-        w.way[t] = (rate[t] - m.drift[t] - w.rest[t]) / size
+        w.way[t] = (rate[t] - m.drift[t] - w.rest[t]) / size if size > 0.0 else 0.0
 
 
 @compiled

@@ -6,7 +6,15 @@ from typing import Any
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.cones import within_bound, without_pull
-from crossbody.reference.core.friction import count_from_none, decided_to, has_friction, is_dry, slip
+from crossbody.reference.core.friction import (
+    count_from_none,
+    decided_to,
+    has_friction,
+    is_decided,
+    is_dry,
+    slip,
+    small_slip,
+)
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loops import is_idle
@@ -14,6 +22,7 @@ from crossbody.reference.core.mode_path import approached
 from crossbody.reference.core.mode_search import ALL, WORST, iterate, judge, near_sets, swept
 from crossbody.reference.core.mode_set import (
     evaluate_set,
+    face_against,
     first_row,
     jammed,
     keep,
@@ -38,9 +47,7 @@ def begin_slip(s: Any, m: Model, w: Work) -> None:
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == CONE and not (s.growth >= 1.0 and within_bound(m, w, i) > 0.0):
             w.begins[i] = 1
-            size = size_along(m, w, i, w.la)
-            for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
-                w.way[w.idx[c]] = -w.la[c] / size if size > 0.0 else 0.0
+            face_against(m, w, i, w.la)
 
 
 @compiled
@@ -83,15 +90,16 @@ def _found_beside_a_jam(s: Any, m: Model, w: Work) -> bool:
 
 @compiled
 def _most_pull(s: Any, m: Model, w: Work) -> float:
-    """The most that pulls a contact back which stands: what it moves by is an error, and so is that.
+    """The most that pulls a contact back which stands, or rests: what it moves by is an error, and so is that.
 
     Rows of a body that rocks on several contacts which stick cannot all keep their velocities at zero.
     """
     most = 0.0
     for j in range(s.na):
-        n = m.follows[w.idx[j]]
-        if n >= 0 and has_friction(m, n) and w.stands[n]:
-            most = max(most, abs(m.alpha[w.idx[j], 1] * w.hda[j]))
+        i, n = w.idx[j], m.follows[w.idx[j]]
+        rests = n < 0 and is_decided(w, i) and abs(w.hda[j]) <= small_slip(s)
+        if rests or (n >= 0 and has_friction(m, n) and w.stands[n]):
+            most = max(most, abs(m.alpha[i, 1] * w.hda[j]))
     return float(most)
 
 
@@ -148,7 +156,7 @@ def _slide_on(s: Any, m: Model, w: Work) -> None:
         if has_friction(m, i) and w.slid[i]:
             size = slip(m, w, i, w.rate)
             for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
-                w.way[w.idx[c]] = (w.hda[c] - w.rest[w.idx[c]]) / size
+                w.way[w.idx[c]] = (w.hda[c] - w.rest[w.idx[c]]) / size if size > 0.0 else 0.0
             put(m, w, i, SLIP)
     evaluate_set(s, m, w)
 
