@@ -9,17 +9,14 @@ from friction_scenes import drawn, run
 from crossbody.cases import Outcome
 
 BLOCK, BLOCKS = 50, 40
-LEFT_OUT = {
-    10_000: "rolls on a rim for ten seconds of processor time",
-    11_613: "a sliding contact pulls in one row, 83 us before the jam up to which its motion is determined",
-    11_877: "is determined up to .233 s; at .436 s a contact that sticks with others bears 1.4 times its bound",
-}
 WENT_ASTRAY = {
     "frictionless corners beside joints that rub": (10014, 10104, 10293, 10343, 10346, 10362, 11157, 11638, 11665),
     "rows that depend on each other contradict later": (10111, 10232, 10282, 10292, 10299),
     "forces that grow towards a jam": (10252, 10521, 10815, 10922, 11473, 11759, 11792),
     "a candidate's noise hid where others let go": (10954,),
     "shares of least norm with and without a contact": (10999, 11631),
+    "a jam that forces do not tell": (11613,),
+    "rows that nearly depend on each other are pulled back": (11877, 20712),
 }
 
 
@@ -38,4 +35,4 @@ def test_scenes_that_went_astray(seed: int) -> None:
 @pytest.mark.parametrize("block", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, BLOCKS))])
 def test_two_thousand_scenes(block: int) -> None:
     seeds = range(10_000 + BLOCK * block, 10_000 + BLOCK * (block + 1))
-    assert sum(obeyed(seed) for seed in seeds if seed not in LEFT_OUT) > BLOCK
+    assert sum(obeyed(seed) for seed in seeds) > BLOCK
