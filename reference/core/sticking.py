@@ -7,6 +7,7 @@ from typing import Any
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.cones import within_bound, without_pull
 from crossbody.reference.core.friction import (
+    bound,
     count_from_none,
     decided_to,
     has_friction,
@@ -17,6 +18,7 @@ from crossbody.reference.core.friction import (
 )
 from crossbody.reference.core.guards import CONE
 from crossbody.reference.core.layout import NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
+from crossbody.reference.core.loads import INSIDE
 from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_path import approached
 from crossbody.reference.core.mode_search import ALL, WORST, iterate, judge, near_sets, swept
@@ -37,16 +39,26 @@ from crossbody.reference.core.others import count_others
 from crossbody.reference.core.slips import note_speed
 
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
+AT_BOUND = 2.0 * (1.0 - INSIDE)  # part of its bound below it at which a contact has reached it, where loads are shared
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 
 
 @compiled
 def begin_slip(s: Any, m: Model, w: Work) -> None:
-    """Let contacts that have reached their bounds begin to slide against the forces that held them, as evaluated."""
+    """Let contacts that have reached their bounds begin to slide against the forces that held them, as evaluated.
+
+    Those that share their loads have reached theirs as well, to what loads are shared: none of them slides alone.
+    """
     without_pull(s, m, w)
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == CONE and not (s.growth >= 1.0 and within_bound(m, w, i) > 0.0):
             w.begins[i] = 1
+    for j in range(s.na if s.dependent_rows > 0 else 0):
+        i = w.idx[j]
+        if has_friction(m, i) and not w.slides[i] and within_bound(m, w, i) <= AT_BOUND * bound(m, i, w.la[j]):
+            w.begins[i] = 1
+    for i in range(s.nc):
+        if w.begins[i]:
             face_against(m, w, i, w.la)
 
 
