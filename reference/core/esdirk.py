@@ -300,7 +300,10 @@ def step(K: Any, s: Any, m: Model, w: Work, h: float) -> float:
     if s.has_velocity:
         _tangent(K, s, m, w, w.y[: s.nq])
     if not s.have_jacobian:
-        if jacobian(K, s, m, w, h) != 0:
+        before, s.lenient = s.lenient, np.inf  # states beside the motion may contradict rows that depend on each other
+        code = jacobian(K, s, m, w, h)
+        s.lenient = before
+        if code != 0:
             return -1.0
     elif s.jacobian_scale != h and _newton_matrix(s, w, h) != 0:
         return -1.0
