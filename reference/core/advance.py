@@ -192,7 +192,7 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             journal.move(s, b, i, active_mode(s, m, w, i))
     if moved and journal.remember(s, b):
         if s.one_by_one:
-            return MODE_CYCLE
+            return PAINLEVE if s.frictional and _all_jam(K, s, m, w, b) else MODE_CYCLE
         s.one_by_one, s.history = 1, 0
     for i in range(s.ng):
         if w.guard_hit[i] <= s.theta:
@@ -238,13 +238,13 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 @compiled
 def _all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Whether contacts that let go in turn would jam if all pressed that close; it marks these."""
+    """Whether contacts that let go in turn would jam, or nearly, if all pressed that close; it marks these."""
     for i in range(s.nc):
         closes = has_friction(m, i) and b.mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
         if closes and not is_dry(m, i):
             b.mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, b.mode)
-    return bool(_jams(K, s, m, w, b, 0.0))
+    return bool(_jams(K, s, m, w, b, JAMMING))
 
 
 @compiled
