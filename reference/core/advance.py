@@ -166,13 +166,14 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if not (s.frictional and events.pulling(s, m, w, b.mode) >= 0):
         record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     journal.remember(s, b)
-    moved, touched, stopped, drifts = False, False, False, False
+    moved, touched, stopped, drifts, caught = False, False, False, False, False
     s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
             stopped = stopped or events.stops(s, m, w, i)
             drifts = drifts or w.kind[i] == guards.DRIFT
+            caught = caught or w.kind[i] == guards.CATCH
             if after != b.mode[i]:
                 touched = touched or b.mode[i] == FREE
                 journal.move(s, b, i, after)
@@ -187,6 +188,9 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     for i in range(s.nc if drifts else 0):
         if events.drifts_too(s, m, w, b.mode, i):
             journal.move(s, b, i, SLIP)
+    for i in range(s.nc if caught else 0):
+        if events.catches_too(K, s, m, w, b.mode, i):
+            journal.move(s, b, i, active_mode(s, m, w, i))
     for i in range(s.nc if touched else 0):
         if events.touches_too(s, m, w, b.mode, i):
             journal.move(s, b, i, active_mode(s, m, w, i))

@@ -21,6 +21,7 @@ from crossbody.reference.core.friction import (
     TURNS_ASIDE,
     WATCH,
     ask,
+    decided_to,
     has_begun,
     has_friction,
     is_dry,
@@ -64,7 +65,7 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.core.machine import active_mode, known, released_mode, slow
+from crossbody.reference.core.machine import active_mode, known, off_law, released_mode, slow
 from crossbody.reference.core.search import first_below, opens
 from crossbody.reference.kinds import Bytes
 
@@ -281,6 +282,16 @@ def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
         return False
     collides = s.frozen and m.beta[i, 0] > 0.0
     return bool(not collides and w.rate[i] < -slow(s) and abs(w.gap[i]) <= known(s, w))
+
+
+@compiled
+def catches_too(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether contact i begins to press where another one just does, as two on an edge do: they share what presses.
+
+    The rows still in contact are those before either. One of them alone would press for both, and rounding choose it.
+    """
+    closes = s.frictional and mode[i] == BALLISTIC and has_friction(m, i) and w.gap[i] <= 0.0 and w.rate[i] < 0.0
+    return bool(closes and abs(off_law(K, s, m, w, i, s.t, w.y[: s.nq], w.y[s.nq :])) <= decided_to(s))
 
 
 @compiled

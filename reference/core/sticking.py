@@ -40,6 +40,7 @@ from crossbody.reference.core.slips import note_speed
 
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 AT_BOUND = 2.0 * (1.0 - INSIDE)  # part of its bound below it at which a contact has reached it, where loads are shared
+ITSELF, BESIDE = 1, 2  # has reached its bound; with one that has
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 
 
@@ -52,11 +53,12 @@ def begin_slip(s: Any, m: Model, w: Work) -> None:
     without_pull(s, m, w)
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == CONE and not (s.growth >= 1.0 and within_bound(m, w, i) > 0.0):
-            w.begins[i] = 1
+            w.begins[i] = ITSELF
     for j in range(s.na if s.dependent_rows > 0 else 0):
         i = w.idx[j]
-        if has_friction(m, i) and not w.slides[i] and within_bound(m, w, i) <= AT_BOUND * bound(m, i, w.la[j]):
-            w.begins[i] = 1
+        near = has_friction(m, i) and not w.slides[i] and within_bound(m, w, i) <= AT_BOUND * bound(m, i, w.la[j])
+        if near and not w.begins[i]:
+            w.begins[i] = BESIDE
     for i in range(s.nc):
         if w.begins[i]:
             face_against(m, w, i, w.la)
@@ -90,6 +92,22 @@ def _found(s: Any, m: Model, w: Work) -> bool:
         iterate(s, m, w, ALL) or swept(s, m, w, ALL) or swept(s, m, w, WORST)
         or approached(s, m, w) or near_sets(s, m, w)
     )  # fmt: skip
+
+
+@compiled
+def _fewer_begin(s: Any, w: Work) -> bool:
+    """Let none begin to slide for being at its bound beside another one; whether there are such."""
+    fewer = False
+    for i in range(s.nc):
+        if w.begins[i] == BESIDE:
+            w.begins[i], fewer = 0, True
+    return fewer
+
+
+@compiled
+def _found_anew(s: Any, m: Model, w: Work) -> bool:
+    look(s, m, w)
+    return _found(s, m, w)
 
 
 @compiled
@@ -137,7 +155,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     note_speed(s, m, w, w.rate)
     s.leeway, s.held_unknowns, s.pressed_in = 0.0, -1, -1
     look(s, m, w)
-    if not _found(s, m, w):
+    if not (_found(s, m, w) or (_fewer_begin(s, w) and _found_anew(s, m, w))):
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
         if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
