@@ -178,10 +178,6 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
                 touched = touched or b.mode[i] == FREE
                 journal.move(s, b, i, after)
                 moved = True
-    for i in range(s.nc if s.frictional else 0):
-        if w.begins[i] and b.mode[i] == STICK:  # with one that has reached its bound
-            journal.move(s, b, i, SLIP)
-            moved = True
     for i in range(s.nc if stopped else 0):
         if events.stops_too(s, m, w, b.mode, i):
             journal.move(s, b, i, STICK)

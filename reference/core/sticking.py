@@ -85,6 +85,28 @@ def _hold_what_stands(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
+def _begin_at_last(s: Any, m: Model, w: Work) -> None:
+    """Let contacts slide that have reached their bounds here before and stuck again, if that is consistent but for less.
+
+    At its bound one that sticks and one that slides differ by rounding, which must not have them take turns for ever.
+    """
+    tried, before = False, s.leeway
+    keep(s, w)
+    for j in range(s.na):
+        i = w.idx[j]
+        if w.begins[i] == ITSELF and w.state[i] == STICK:
+            put(m, w, i, SLIP)
+            tried = True
+    if tried:
+        s.leeway = max(s.leeway, IDLE * s.push_scale)
+        fits = judge(s, m, w) < 0
+        s.leeway = before
+        if not fits:
+            put_back(s, m, w)
+            judge(s, m, w)
+
+
+@compiled
 def _found(s: Any, m: Model, w: Work) -> bool:
     """Whether a consistent set is found, contacts as they are tried first."""
     put_as_they_are(s, m, w)
@@ -159,6 +181,8 @@ def decide(s: Any, m: Model, w: Work) -> int:
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
         if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
+    if s.one_by_one:
+        _begin_at_last(s, m, w)
     _hold_what_stands(s, m, w)
     count_others(s, m, w)
     for j in range(s.na):
