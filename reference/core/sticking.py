@@ -86,7 +86,7 @@ def _hold_what_stands(s: Any, m: Model, w: Work) -> None:
 
 @compiled
 def _begin_at_last(s: Any, m: Model, w: Work) -> None:
-    """Let contacts slide that have reached their bounds here before and stuck again, if that is consistent but for less.
+    """Let contacts slide that have reached their bounds here before and stuck again, if that is nearly consistent.
 
     At its bound one that sticks and one that slides differ by rounding, which must not have them take turns for ever.
     """

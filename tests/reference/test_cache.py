@@ -407,6 +407,8 @@ def test_a_user_without_a_home_runs(tmp_path):
 
 
 def test_a_stopped_holder_of_a_lock_is_told_and_not_waited_for(folder, monkeypatch, capsys):
+    monkeypatch.setattr(code_store, "_told", set())
+    monkeypatch.setattr(code_store.count, "told", False)
     monkeypatch.setattr(code_store, "TELL_S", 0.1)
     monkeypatch.setattr(code_store, "WAIT_S", 2.0)
     _value(_kernel(10.0))
