@@ -12,12 +12,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import float64, void
+from numba import float64, int64, void
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import DEFAULT_FLAGS, DefaultPassBuilder
 from numba.core.errors import NumbaRuntimeError, TypingError
 from numba.core.types.functions import BaseFunction
 
 from crossbody.reference import _program, ahead, kernels
 from crossbody.reference._hastened import hastened
+from crossbody.reference._parts import NEEDLESS
 from crossbody.reference.cache import ALLOCATES, ALLOCATES_NOTHING, Compiled, Part, compiled
 from crossbody.reference.compiling import Count
 from crossbody.reference.systems import absent
@@ -142,6 +145,44 @@ def test_a_sum_of_numbers_is_resolved_once(monkeypatch: pytest.MonkeyPatch, tmp_
     found = compiled(total, [float64(float64, float64)])
     assert len(asked) == len(set(asked)) == 1
     assert found(1.0, 2.0) == total(1.0, 2.0)
+
+
+def shared(x: float, k: int) -> float:
+    return x * k if k > 1 else x - k
+
+
+@pytest.mark.parametrize(("module", "versions"), [(ALLOCATES_NOTHING[0] + "one", 1), (__name__, 3)])
+def test_constants_are_numbers_to_what_is_called_with_them(
+    module: str, versions: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Each constant would be a version of its own to compile; a user's own code may need to know which it is."""
+    monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path))
+    monkeypatch.setattr(shared, "__module__", module)
+    part = compiled(shared)
+
+    def total(x: float) -> float:
+        return part(x, 1) + part(x, k=2) + part(x, 3)
+
+    found = compiled(total, [float64(float64)])
+    assert len(part.overloads) == versions
+    assert found(5.0) == shared(5.0, 1) + shared(5.0, 2) + shared(5.0, 3)
+
+
+@pytest.mark.parametrize(("module", "count"), [(ALLOCATES_NOTHING[0] + "one", 0), (__name__, 1)])
+def test_the_whole_is_optimised_twice_only_where_references_are_counted(
+    module: str, count: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    twice, optimise = list[Any](), JITCodeLibrary._optimize_final_module
+    monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path))
+    monkeypatch.setattr(shared, "__module__", module)
+    monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", lambda one: (twice.append(one), optimise(one))[1])
+    assert compiled(shared, [float64(float64, int64)])(2.0, 3) == 6.0
+    assert len(twice) == count
+
+
+def test_passes_that_are_left_out_are_numbas() -> None:
+    state = SimpleNamespace(func_ir=None, flags=DEFAULT_FLAGS)
+    assert {kind.name() for kind, _ in DefaultPassBuilder.define_nopython_pipeline(state).passes} >= NEEDLESS
 
 
 def test_the_collector_and_numba_are_as_they_were() -> None:
