@@ -16,6 +16,12 @@ import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary, RuntimeLinker
 from numba.core.compiler import Compiler
 
+NEEDLESS = frozenset({
+    "with_lifting", "inline_closure_likes", "make_function_op_code_to_jit_function", "inline_inlinables",
+    "find_literally", "literal_unroll", "LiteralPropagation", "inline_overloads",
+})  # fmt: skip
+"""Passes of numba for what no code has that makes no arrays: closures, comprehensions, `with`, `literal_unroll`."""
+
 
 class _Library(JITCodeLibrary):  # type: ignore[misc]
     """Code of one function, and what it calls by name."""
@@ -40,6 +46,14 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
         for part in parts:
             if part.environment is not None:
                 self._codegen.set_env(*part.environment)
+
+    def _optimize_final_module(self) -> None:
+        """Optimise the whole once: numba does it twice where references are counted, to find pairs that cancel."""
+        if any(one.name.startswith("NRT_") for one in self._final_module.functions):
+            super()._optimize_final_module()
+            return
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
 
     def _close_circles(self) -> None:
         """Let functions that call themselves, or each other in turn, find what they call inside the whole.
@@ -98,6 +112,14 @@ class WholePasses(Compiler):  # type: ignore[misc]
     """numba's passes for a function that is called from outside."""
 
     library = _Library
+
+    def define_pipelines(self) -> Any:
+        """Leave out what nothing is done by where no references are counted: a tenth of all that Python does."""
+        found = super().define_pipelines()
+        for one in found if not self.state.flags.nrt else ():
+            one.passes = [(kind, told) for kind, told in one.passes if kind.name() not in NEEDLESS]
+            one.finalize()
+        return found
 
     def _compile_core(self) -> Any:
         state = self.state

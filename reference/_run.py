@@ -22,6 +22,7 @@ from crossbody.reference._interrupt import LONG_S, Interrupts
 from crossbody.reference._program import entry, friction_code, instant_code
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System, initial_modes
+from crossbody.reference.ahead import ask
 from crossbody.reference.core import layout
 from crossbody.reference.core.bundles import table
 from crossbody.reference.kinds import Floats
@@ -78,6 +79,7 @@ class CompiledRun:
     def __init__(self, system: System, q0: Floats, v0: Floats, options: Options) -> None:
         self.system, self.options = system, options
         if system.frictional:  # this and modes first: another process may still be compiling the loop
+            ask("modes")
             friction_code()
         instant_code()
         self.call = entry(tuple(system.kernels.values()))

@@ -7,57 +7,91 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache, partial
 from pkgutil import resolve_name
 from threading import Thread
 
 from crossbody.cases import UnknownName
+from crossbody.cases.parent import die_with_parent
 from crossbody.reference.compiling import count
 
 PIECES = {
     "integrator": "_program:program",
-    "modes": "_program:instant_code",
     "friction": "_program:friction_code",
+    "modes": "_program:instant_code",
     "SUNDIALS": "sundials.compiled.evaluation:compile_equations",
     "ensemble": "_ensemble:compile_loop",
 }
 """Name -> what compiles it; the largest first. Each can be compiled in a process of its own."""
 
 
-BESIDE = ("integrator", "SUNDIALS", "modes")
-"""What runs need beside the kernels of their mechanism, in order: a run compiles the last itself, meanwhile."""
+BESIDE = "integrator"
+"""What another process compiles first: the largest piece of what every run needs. A run compiles the rest meanwhile."""
 _alone = False  # whether somebody else sees to the other pieces
+_asked = [BESIDE]
+_process: subprocess.Popen[str] | None = None
 
 
 @cache
 def begin() -> None:
     """Have `BESIDE` compiled by a process of its own from the first code on that this one compiles, and say so.
 
-    Nothing is begun where nothing is missing. The process ends with this one.
+    Nothing is begun where the loop is not missing. The process ends with this one.
     """
     from crossbody.reference._program import is_missing
 
     if _alone or not is_missing():
         return
+    if processors() > 1:
+        _begin()
     count.need(_missing())
     count.tell()
-    if (os.cpu_count() or 1) < 2:
-        return
-    none, work = subprocess.DEVNULL, "from crossbody.reference import ahead; ahead.compile_beside()"
-    process = subprocess.Popen([sys.executable, "-c", work], stdin=none, stdout=subprocess.PIPE, stderr=none, text=True)
-    atexit.register(_end, process)
-    Thread(target=_follow, args=(process.stdout,), daemon=True).start()
+
+
+def _begin() -> None:
+    global _process
+    pipe, work = subprocess.PIPE, "from crossbody.reference import ahead; ahead.compile_beside()"
+    _process = subprocess.Popen(
+        [sys.executable, "-c", work], stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True
+    )
+    atexit.register(_end, _process)
+    Thread(target=_follow, args=(_process.stdout,), daemon=True).start()
+    for name in _asked:
+        _send(_process, name)
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def ask(name: str) -> None:
+    """Have the process beside, where there is one or will be, compile a piece too that may be needed.
+
+    Args:
+        name: of `PIECES`.
+    """
+    if name not in _asked:
+        _asked.append(name)
+        if _process is not None:
+            _send(_process, name)
+
+
+def _send(process: subprocess.Popen[str], name: str) -> None:
+    assert process.stdin is not None
+    with suppress(OSError):  # it may have been ended: what it leaves is compiled here
+        process.stdin.write(f"{name}\n")
+        process.stdin.flush()
 
 
 def _missing() -> set[str]:
-    """Names of the functions that `BESIDE` compiles, but for those of pieces that are kept."""
+    """Names of the functions that every run needs, but for those of pieces that are kept."""
     from crossbody.reference._fingerprint import names_within
     from crossbody.reference._program import units
     from crossbody.reference.cache import compiled
-    from crossbody.reference.sundials.compiled.evaluation import SIGNATURE, evaluate
 
-    needed = (*units(), (evaluate, SIGNATURE))
-    missing = (function for function, signature in needed if compiled(function, lazy=[signature]).lacks(signature))
+    missing = (function for function, signature in units() if compiled(function, lazy=[signature]).lacks(signature))
     return set[str]().union(*map(names_within, missing))
 
 
@@ -68,10 +102,14 @@ def _follow(names: Iterable[str]) -> None:
 
 
 def compile_beside() -> None:
-    """Compile `BESIDE`, and print the name of each function that is ready, for the process that began this one."""
+    """Compile the pieces that the process which began this one asks for, and tell it of each function that is ready.
+
+    Their names come in over stdin, those of functions go out over stdout; the end of either is the end.
+    """
+    die_with_parent()
     count.pass_on = partial(print, flush=True)
-    for name in BESIDE:
-        compile_piece(name)
+    for name in sys.stdin:
+        compile_piece(name.rstrip("\n"))
 
 
 def meanwhile(name: str) -> None:

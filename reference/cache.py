@@ -328,6 +328,13 @@ class Part(Lean):
     def __init__(self, function: Callable[..., Any], targetoptions: Any) -> None:
         super().__init__(function, None, {"nopython": True, **targetoptions}, pipeline_class=PartPasses)
 
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Tell the type inference of a caller about one version for all numbers, not one for each constant."""
+        if _home(self.py_func).startswith(OURS):
+            _, folded = self._compiler.fold_argument_types(args, kws)
+            args, kws = tuple(map(types.unliteral, folded)), {}
+        return super().get_call_template(args, kws)
+
     def compile(self, sig: Any) -> Any:
         """Lower for a signature, with the values that are read now."""
         if not self.overloads:

@@ -46,15 +46,16 @@ class Count:
     def done(self, name: str) -> None:
         """Count a function that is ready, here or in another process."""
         self.pass_on(name)
-        if name in self.needed and name not in self.ready:
-            self.ready.add(name)
-            if self.told and time.monotonic() - self._last >= self.every:
-                self.tell()
+        if name in self.ready:
+            return
+        self.ready.add(name)
+        if name in self.needed and self.told and time.monotonic() - self._last >= self.every:
+            self.tell()
 
     def tell(self) -> None:
         """Say how far it is, from now on again and again until all is ready."""
         self.told, self._last = True, time.monotonic()
-        self.show(len(self.ready), len(self.needed))
+        self.show(len(self.ready & self.needed), len(self.needed))
 
     def _tell_first(self) -> None:
         if not self.told:

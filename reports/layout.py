@@ -149,3 +149,9 @@ def _aligned(head: str, column: Sequence[str]) -> list[str]:
     words = any(cell[:1].isalpha() and cell not in ("nan", "inf") for cell in column)
     wide = _wide(head, column)
     return [text.ljust(wide) if words else text.rjust(wide) for text in (head, *column)]
+
+
+def bounded(value: float | None, known: float | None) -> tuple[str, float]:
+    """Return a sign and what a number is known to where it is below that, else nothing and the number."""
+    number, limit = (math.nan if x is None else x for x in (value, known))
+    return ("< ", limit) if abs(number) < limit else ("", number)

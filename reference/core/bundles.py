@@ -56,7 +56,7 @@ def _read_field(context: Any, builder: Any, bundle: BundleType, value: Any, name
     table = builder.bitcast(value, word.as_pointer())
     address, *shape = (builder.load(builder.gep(table, [ir.Constant(word, 3 * row + i)])) for i in range(1 + kind.ndim))
     dtype = context.get_data_type(kind.dtype)
-    itemsize = ir.Constant(word, context.get_abi_sizeof(dtype))
+    itemsize = ir.Constant(word, kind.dtype.bitwidth // 8)
     strides = [itemsize] if kind.ndim == 1 else [builder.mul(itemsize, shape[1]), itemsize]
     # No proxy in memory, as numba makes one: there are more than a thousand of these to compile.
     model = context.data_model_manager[kind]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -32,7 +31,7 @@ def warm() -> int:
 
 def _processes() -> ProcessPoolExecutor:
     """As many as there are processors, which leave it to this one to say how far they are."""
-    return ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), initializer=silence)
+    return ProcessPoolExecutor(ahead.processors(), get_context("spawn"), initializer=silence)
 
 
 def _each(

@@ -20,7 +20,7 @@ from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Row, exit_code
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages import results, site
+from crossbody.reports.pages import results
 from crossbody.reports.runs import choice, files, jobs, output, store, study, watch
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
@@ -49,7 +49,7 @@ def run(
     picks, asked = choice.picks(wanted), choice.parse_settings(settings, "--set-engine")
     choice.check_asked(asked, picks)
     output.check(out, "run")
-    site.check(against, others)
+    results.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
     clock, compiled = [perf_counter()], count.seconds
     decides = identity("run", cases, names, picks=picks, rtol=rtol, settings=asked, budget=budget)
@@ -74,6 +74,8 @@ def run(
             # Pages take longer than all but the engines: what they show is told before them, and lost by nothing.
             untold = _tell(rows, made, controlled=any(case.control is not None for case in cases))
             clock.append(perf_counter())
+            from crossbody.reports.pages import site  # after the verdicts: templates take longer to import than to fill
+
             site.write(made, against=against, others=others)
     if untold is not None:
         raise untold

@@ -14,7 +14,6 @@ from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, runs_of, sentence
 from crossbody.reports.judging.verdict import Regression, Row, Word
 from crossbody.reports.layout import unit_text
-from crossbody.reports.pages import html
 from crossbody.reports.pages.results import Times
 
 MANY = 4  # cases that are named of those that an engine could not run
@@ -90,7 +89,7 @@ def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
 def _error(run: EngineRun, metric: str) -> str:
     """A number in two digits, or below what it is known to."""
     row: Mapping[str, float] = next((row for row in run.rows if row["metric"] == metric), {})
-    below, number = html.bounded(row.get("value"), row.get("known"))
+    below, number = layout.bounded(row.get("value"), row.get("known"))
     return "-" if number != number else f"{below}{number:.1e}"
 
 

@@ -12,8 +12,8 @@ import click
 from crossbody.cases import Case, installed
 from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports import layout, voice
-from crossbody.reports.pages import site
 from crossbody.reports.runs import output, study
+from crossbody.reports.runs.manifest import PAGE
 from crossbody.reports.runs.provenance import code
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ def key(number: int, case: Case) -> str:
 
 def publish(out: Path, name: str, tables: Mapping[str, pd.DataFrame], told: Mapping[str, Any]) -> None:
     """Write the tables of a study without verdicts (Parquet, CSV, JSON) and its page, all or nothing."""
+    from crossbody.reports.pages import site
+
     with output.folder(out, name) as made:
         study.write(made, [], study.judge([], {}), told)
         for stem, rows in tables.items():
@@ -57,4 +59,4 @@ def print_rows(rows: pd.DataFrame, digits: int = 4, title: str = "", **how: Any)
 def where(out: Path) -> None:
     """The path of the report, unless nothing but what is wrong is to be said."""
     if not voice.silent():
-        print(f"Report: {(out / site.PAGE).absolute()}")
+        print(f"Report: {(out / PAGE).absolute()}")

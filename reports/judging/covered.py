@@ -7,6 +7,7 @@ import numpy as np
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.files.case import rubbing
 from crossbody.cases.files.contacts import Meeting, meeting
+from crossbody.reference import ahead
 from crossbody.reports.judging.reach import COARSE, motion
 
 LOOSE = 100.0
@@ -25,8 +26,10 @@ def covered(case: Case, budget: float) -> Case:
     """
     if not case.file:
         return case
+    if (rubs := rubbing(case)) is not None:
+        ahead.ask("friction")
     met = _met(case, COARSE, budget)
-    if met is not None and (rubs := rubbing(case)) is not None:
+    if met is not None and rubs is not None:
         case, met = rubs, _met(rubs, COARSE, budget)
     if met is None:
         return case

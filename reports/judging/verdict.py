@@ -197,3 +197,11 @@ def band(stored: float | None, limit: Limit | None, claim: Claim | None = None) 
 def exit_code(words: Iterable[str], regressions: Iterable[str] = ()) -> int:
     """0 if nothing is outside or crashed (a known deviation counts as fine) and nothing is lost, else 1."""
     return int(any(word in (Word.OUTSIDE, Word.CRASHED) for word in words) or Regression.LOST in set(regressions))
+
+
+def by(rows: Iterable[Row], key: str) -> dict[str, list[Row]]:
+    """Rows by the value of one column."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(row[key], []).append(row)
+    return found

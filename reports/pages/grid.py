@@ -10,9 +10,9 @@ from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import runs_of, share
-from crossbody.reports.judging.verdict import Row, Word
-from crossbody.reports.layout import unit_text
-from crossbody.reports.pages.html import bounded, number
+from crossbody.reports.judging.verdict import Row, Word, by
+from crossbody.reports.layout import bounded, unit_text
+from crossbody.reports.pages.html import number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
@@ -81,14 +81,6 @@ def names(rows: Iterable[Row]) -> list[str]:
     found = dict.fromkeys(row["who"] for row in rows)
     order = list(dict.fromkeys(who.partition(":")[0] for who in found))
     return sorted(found, key=lambda who: order.index(who.partition(":")[0]))
-
-
-def by(rows: Iterable[Row], key: str) -> dict[str, list[Row]]:
-    """Rows by the value of one column."""
-    found: dict[str, list[Row]] = {}
-    for row in rows:
-        found.setdefault(row[key], []).append(row)
-    return found
 
 
 def worst(rows: Sequence[Row]) -> tuple[str, str]:

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from crossbody.cases import OutputError
 from crossbody.reference import code_store
 from crossbody.reports.figures.section import Column, Figure, Kind, Section, Table, Written
+from crossbody.reports.layout import bounded
 
 LEVEL = 6
 """Of compression: more takes three times as long for a hundredth of the size."""
@@ -239,27 +240,9 @@ def plot(figure: Figure | Written) -> dict[str, Any]:
     return {"title": made["layout"]["title"]["text"], "height": layout["height"], "value": value}
 
 
-def file_name(label: str) -> str:
-    """A label as the name of a file and an id: distinct for distinct labels, no path in it.
-
-    A colon becomes a dot; whatever else is not a letter, digit, hyphen or underscore, or is too
-    long, is replaced and told apart by a hash.
-    """
-    plain = label.replace(":", ".", 1)
-    if re.fullmatch(r"[A-Za-z0-9_-]{1,80}(\.[A-Za-z0-9_-]{1,80})?", plain) and "." not in label:
-        return plain
-    return f"{re.sub(r'[^A-Za-z0-9_-]+', '-', label)[:60]}-{hashlib.sha256(label.encode()).hexdigest()[:8]}"
-
-
 def slug(text: str) -> str:
     """A text as a class or an id."""
     return re.sub(r"[^A-Za-z0-9_-]+", "-", text)
-
-
-def bounded(value: float | None, known: float | None) -> tuple[str, float]:
-    """Return a sign and what a number is known to where it is below that, else nothing and the number."""
-    number, limit = (math.nan if x is None else x for x in (value, known))
-    return ("< ", limit) if abs(number) < limit else ("", number)
 
 
 def told(table: Table) -> list[Column]:

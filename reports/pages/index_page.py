@@ -13,7 +13,7 @@ import numpy as np
 
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.judging.told import WRONG, runs_of, sentence, share
-from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
@@ -133,7 +133,7 @@ def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i:
 
 
 def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
-    mine = grid.by(found.rows.get(case.label, ()), "who")
+    mine = by(found.rows.get(case.label, ()), "who")
     cells = [
         grid.whole(case.label, case.page, who, mine.get(who, ()), found.walls.get((case.label, who))) for who in shown
     ]

@@ -10,11 +10,9 @@ from typing import Any
 from pyarrow import ArrowException
 
 from crossbody.cases import InvalidValue, OutputError
-from crossbody.reports.figures.styles import label
-from crossbody.reports.judging.verdict import COLUMNS, Row, Word
-from crossbody.reports.pages.grid import by
-from crossbody.reports.pages.html import file_name
-from crossbody.reports.runs.files import listed
+from crossbody.reports.judging.verdict import COLUMNS, Row, Word, by
+from crossbody.reports.runs import beside
+from crossbody.reports.runs.files import file_name, listed
 from crossbody.reports.runs.output import is_staged, recover
 from crossbody.reports.runs.store import Trace, load, peek
 from crossbody.reports.runs.study import check_fields, read_json
@@ -160,8 +158,18 @@ def _missing(label: str, engines: list[str], times: Times, broken: list[str]) ->
     return (f"No motion is stored for {names}{unreadable}: what is drawn below is without it.",)
 
 
+def check(against: Path | None, others: Sequence[Path]) -> None:
+    """Say before anything is computed whether the folders to be shown beside can be read."""
+    if against is not None:
+        verdicts_of(against)
+    for other in others:
+        beside.tables(other)
+
+
 def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
     """One motion of a folder, "truth" or of an engine:profile, and its place among those of its case."""
+    from crossbody.reports.figures.styles import label
+
     found = _cases(out, verdicts_of(out))[0]
     mine = next((one for one in found if one.paths and case in ("", one.label)), None)
     if mine is None:

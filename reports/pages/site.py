@@ -17,22 +17,13 @@ from crossbody.reports.figures.section import Section
 from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
-from crossbody.reports.pages.results import Results, read, verdicts_of
+from crossbody.reports.pages.results import Results, read
 from crossbody.reports.runs import beside, output
+from crossbody.reports.runs.manifest import INDEX, PAGE
 from crossbody.reports.runs.output import replace_text
 from crossbody.reports.runs.study import read_json
 
-INDEX = "index"
-PAGE = f"{INDEX}.html"
 FULL = 2.25  # cases whose plots have their usual room in a single file; those of more share it
-
-
-def check(against: Path | None, others: Sequence[Path]) -> None:
-    """Say before anything is computed whether the folders to be shown beside can be read."""
-    if against is not None:
-        verdicts_of(against)
-    for other in others:
-        beside.tables(other)
 
 
 def write(out: Path, *, single_file: bool = False, against: Path | None = None, others: Sequence[Path] = ()) -> Path:

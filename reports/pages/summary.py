@@ -11,7 +11,7 @@ from typing import Any
 
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.judging.told import share
-from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.results import Results
@@ -56,7 +56,7 @@ def _cells(found: Results) -> dict[str, dict[str, Sequence[Row]]]:
     """Rows of every engine and, of those, of every case."""
     cells: dict[str, dict[str, Sequence[Row]]] = {}
     for label, rows in found.rows.items():
-        for who, mine in grid.by((row for row in rows if row["engine"] != TRUTH), "who").items():
+        for who, mine in by((row for row in rows if row["engine"] != TRUTH), "who").items():
             cells.setdefault(who, {})[label] = mine
     return {who: cells[who] for who in grid.names({"who": who} for who in cells)}
 

@@ -28,6 +28,18 @@ def is_plain(name: object) -> bool:
     return 0 < len(parts) <= DEPTH and all(NAME.fullmatch(part) for part in parts)
 
 
+def file_name(label: str) -> str:
+    """A label as the name of a file and an id: distinct for distinct labels, no path in it.
+
+    A colon becomes a dot; whatever else is not a letter, digit, hyphen or underscore, or is too
+    long, is replaced and told apart by a hash.
+    """
+    plain = label.replace(":", ".", 1)
+    if re.fullmatch(r"[A-Za-z0-9_-]{1,80}(\.[A-Za-z0-9_-]{1,80})?", plain) and "." not in label:
+        return plain
+    return f"{re.sub(r'[^A-Za-z0-9_-]+', '-', label)[:60]}-{hashlib.sha256(label.encode()).hexdigest()[:8]}"
+
+
 @contextmanager
 def directory(folder: Path, name: str = "", make: bool = False) -> Iterator[int]:
     """Open a folder, or one inside it, without following a link below `folder`.

@@ -14,6 +14,7 @@ from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, InvalidValue, Outcome, SceneError, Trajectory, Value
 from crossbody.cases.arguments import instance
 from crossbody.cases.public_names import TEXT, Public, check_values
+from crossbody.reference import ahead
 from crossbody.reference.compiling import count
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
@@ -95,6 +96,8 @@ def run_case(
             "A run that is judged takes the samples that its events and its motion need: leave samples out."
         )
     check_names(case)
+    if not case.general:
+        ahead.ask("SUNDIALS")
     label = f"{case.label}: truth"
     tell(label)
     watch.limited(label, TRUTHS * limit)

@@ -20,6 +20,9 @@ from crossbody.reports.runs import files
 
 MARKER = ".crossbody"  # holds the manifest; stands in every folder that crossbody wrote
 PAGES, EARLIER = "pages", "earlier"
+INDEX = "index"
+PAGE = f"{INDEX}.html"
+"""Where a reader begins."""
 """What is made from the tables of all studies; what a version without manifests wrote."""
 JUDGED = frozenset({"run", "replay", "identify"})
 """Studies with verdicts: a folder holds those of one of them."""

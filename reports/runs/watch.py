@@ -9,7 +9,6 @@ begun again without that run; what was complete is on disk and is not done twice
 
 from __future__ import annotations
 
-import ctypes
 import io
 import json
 import mmap
@@ -24,6 +23,8 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, TextIO
 
+from crossbody.cases.parent import die_with_parent
+
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
 
@@ -34,7 +35,6 @@ TICK = 0.2
 SOON = 0.01  # time after which an interrupt that was swallowed is raised again, s
 _ROOM = 1 << 16
 ENDED = (0, 1, 2)  # exit codes of a command that had come to its end before the interrupt reached it
-_PARENT_DEATH = 1  # PR_SET_PDEATHSIG
 
 
 class Stopped(BaseException):
@@ -193,7 +193,7 @@ def _begun(task: Callable[[], int]) -> int:
     code = 0
     try:
         os.setpgid(0, 0)
-        _die_with_parent()
+        die_with_parent()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
             signal.signal(number, signal.SIG_DFL)
         code = watched(lambda: _quietly(task))
@@ -273,7 +273,7 @@ def _obey(command: Callable[[], int]) -> None:
     """Be the child: run the command, and leave without the parent's last words."""
     code = 3
     try:
-        _die_with_parent()
+        die_with_parent()
         sys.stdout, sys.stderr = _unread(sys.stdout), _unread(sys.stderr)
         signal.signal(signal.SIGINT, _stop_once)
         signal.signal(signal.SIGALRM, _stop_again)
@@ -343,11 +343,3 @@ def _insist(swallowed: sys.UnraisableHookArgs) -> None:
         signal.setitimer(signal.ITIMER_REAL, SOON)
     else:
         sys.__unraisablehook__(swallowed)
-
-
-def _die_with_parent() -> None:
-    """Have the system end this process with its parent, where it can."""
-    try:
-        ctypes.CDLL(None).prctl(_PARENT_DEATH, signal.SIGKILL)
-    except (OSError, AttributeError):
-        return

@@ -36,6 +36,17 @@ def test_counts_rise_and_end_where_all_is_ready(seed: int) -> None:
     assert said[1:] == [(k, len(names)) for k in range(1, len(names) + 1)]
 
 
+def test_what_is_ready_before_it_is_known_to_be_needed_counts() -> None:
+    """Another process may compile a piece of which nobody knew whether it would be needed."""
+    count, said = Count(), list[tuple[int, int]]()
+    count.show = lambda *told: said.append(told)
+    for name in "abx":
+        count.done(name)
+    count.need("abc")
+    count.tell()
+    assert said == [(2, 3)]
+
+
 def test_nothing_is_told_before_it_is_asked_for_nor_too_often() -> None:
     said = list[tuple[int, int]]()
     count = Count(every=1e6, show=lambda *told: said.append(told))

@@ -28,6 +28,27 @@ def test_a_run_of_the_reference_imports_nothing_for_others(tmp_path: Path) -> No
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.split() == ["0"]
 
 
+SHOWN = """
+import sys
+MADE_BY = ("jinja2", "crossbody.reports.pages.html")
+from crossbody.reports.commands import run
+from crossbody.reports.cli import main
+show = run.show
+run.show = lambda *told: (show(*told), print("pages:", *(name in sys.modules for name in MADE_BY)))
+try:
+    main(["run", "bouncing_ball:listing", "-e", "reference:compiled", "--out", sys.argv[1]])
+finally:
+    print("at the end:", "jinja2" in sys.modules)
+"""
+
+
+def test_what_makes_pages_is_imported_once_the_verdicts_are_shown(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", SHOWN, str(tmp_path / "out")]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "within" in told.partition("pages: False False")[0]
+    assert told.endswith("at the end: True\n")
+
+
 @pytest.fixture
 def collector() -> Iterator[None]:
     """The collector of garbage, which is put back as it was."""

@@ -29,8 +29,9 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.html import KeptTemplates, Page, file_name, plot
+from crossbody.reports.pages.html import KeptTemplates, Page, plot
 from crossbody.reports.runs import study
+from crossbody.reports.runs.files import file_name
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
 from crossbody.reports.runs.store import Trace
