@@ -132,6 +132,34 @@ def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browse
     assert browser.complaints() == []
 
 
+SIXTY = """(async () => {
+    const began = performance.now();
+    for (let k = 0; k < 60; k += 1) await new Promise(requestAnimationFrame);
+    return performance.now() - began;
+})()"""
+"""How long sixty frames take, ms."""
+
+
+def layouts(browser: chromium.Browser) -> int:
+    """How often the page has been laid out."""
+    told = browser.call("Performance.getMetrics")["metrics"]
+    return next(one["value"] for one in told if one["name"] == "LayoutCount")
+
+
+def test_a_picture_that_moves_leaves_the_page_as_it_is(out: Path, browser: chromium.Browser) -> None:
+    """Each layout of a page takes time from the picture; the readout alone needs one, ten times a second."""
+    browser.open(out / CASE)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    browser.wait(DRAWN)
+    browser.call("Performance.enable")
+    browser.js("document.querySelector('[data-play]').click()")
+    browser.js(NEXT_FRAME)
+    before = layouts(browser)
+    took = browser.js(SIXTY)
+    assert layouts(browser) - before <= took / 100.0 + 2.0
+    assert browser.complaints() == []
+
+
 def test_one_steps_from_event_to_event_and_sees_differences_larger(out: Path, browser: chromium.Browser) -> None:
     browser.open(out / CASE)
     browser.js("document.querySelector('.player').scrollIntoView()")

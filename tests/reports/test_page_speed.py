@@ -21,6 +21,7 @@ pytestmark = [
 ]
 COUNT, SECONDS, TRIALS = 30, 3.0, 5
 FRAME = 1000.0 / 60.0  # time that one of 60 frames a second may take, ms
+SHARE = 1.0 / 3.0  # of a frame that the page may work: the rest is the browser's and other programs'
 LOADED = 1500.0
 """Time in which the main page is to be there with its first plot, ms; others may share the machine."""
 
@@ -75,4 +76,4 @@ def test_thirty_bodies_move_at_sixty_frames_a_second(tmp_path: Path, browser: ch
     work = (busy(browser) - before) / frames
     print(f"{COUNT} bodies: {frames / SECONDS:.0f} frames a second, {work:.1f} of {FRAME:.1f} ms of work each")
     assert browser.complaints() == []
-    assert work < FRAME
+    assert work < SHARE * FRAME

@@ -57,19 +57,14 @@ crossbody.solids = (() => {
       return { ...solid, points, depth: points.reduce((sum, p) => sum + p[3], 0) / points.length };
     });
     g.strokeStyle = look.ink;
+    g.fillStyle = `color-mix(in srgb, ${look.ink} 22%, ${look.paper})`;
     for (const { points, radius, faces } of drawn.sort((a, b) => b.depth - a.depth)) {
       const r = radius * points[0][2];
       const around = outline(r ? points.flatMap(([x, y]) => ROUND.map(([c, s]) => [x + r * c, y + r * s])) : points);
       trace(g, around);
       g.closePath();
-      if (!look.ghost) {
-        for (const [colour, alpha] of [[look.paper, 1], [look.ink, 0.22]]) {
-          g.fillStyle = colour;
-          g.globalAlpha = alpha;
-          g.fill();
-        }
-        g.globalAlpha = 1;
-      }
+      if (!look.ghost) g.fill();
+      g.lineJoin = r ? "miter" : "round"; // a round outline is smooth as it is
       g.lineWidth = look.width;
       g.stroke();
       g.lineWidth = 0.6 * look.width;
