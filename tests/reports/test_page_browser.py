@@ -149,8 +149,8 @@ def layouts(browser: chromium.Browser) -> int:
 def test_a_picture_that_moves_leaves_the_page_as_it_is(out: Path, browser: chromium.Browser) -> None:
     """Each layout of a page takes time from the picture; the readout alone needs one, ten times a second."""
     browser.open(out / CASE)
+    draw_all(browser)
     browser.js("document.querySelector('.player').scrollIntoView()")
-    browser.wait(DRAWN)
     browser.call("Performance.enable")
     browser.js("document.querySelector('[data-play]').click()")
     browser.js(NEXT_FRAME)
