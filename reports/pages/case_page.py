@@ -11,7 +11,7 @@ from typing import Any
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.figures.styles import label, style
-from crossbody.reports.judging.told import share
+from crossbody.reports.judging.told import beyond, share
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import suits
@@ -93,7 +93,8 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": rows, "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
+            "rows": [row | {"beyond": beyond(row)} for row in rows],
+            "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
             "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
         },
@@ -103,7 +104,8 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
 def _far(row: Row) -> tuple[int, float]:
     """The worst word first, and of one word what is farthest out."""
     word = row["verdict"]
-    return (grid.WORST.index(word), -share(row)) if word in grid.WORST else (len(grid.WORST), 0.0)
+    known = word in grid.WORST or beyond(row)
+    return (grid.RANKED.index(word), -share(row)) if known else (len(grid.RANKED), 0.0)
 
 
 def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[Section]:

@@ -170,7 +170,7 @@ def _tiles(found: Results) -> dict[str, Any]:
     words = {word: counts[word] for word in (*reversed(grid.WORST), Word.SKIPPED.value)}
     failed = sum(row["metric"] == "audit" and row["verdict"] == Word.OUTSIDE for row in found.verdicts)
     tiles = [
-        {"value": len(found.cases), "title": "cases", "word": ""},
+        {"value": len(found.cases), "title": "case" if len(found.cases) == 1 else "cases", "word": ""},
         {
             "value": len({row["who"] for row in found.verdicts if row["engine"] != TRUTH}),
             "title": "engine profiles",

@@ -90,7 +90,8 @@ const crossbody = (() => {
     const [show, engine] = [value("verdict"), value("engine")];
     section.querySelectorAll("tbody tr").forEach((row) => {
       const verdict = row.dataset.verdict;
-      const wanted = show === "all" || (show === "judged" ? verdict !== "not judged" : verdict.endsWith("outside") || verdict === "crashed");
+      const wanted = show === "all" || "beyond" in row.dataset
+        || (show === "judged" ? verdict !== "not judged" : verdict.endsWith("outside") || verdict === "crashed");
       const mine = engine ? row.dataset.engine === engine : crossbody.shown(row.dataset.engine);
       row.hidden = !(wanted && mine && words.every((word) => row.textContent.toLowerCase().includes(word)));
     });
