@@ -50,7 +50,7 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
             *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
-            *precision(found.out, case.label, rows, _walls(found, case)), *studied(found.out, case.about),
+            *precision(found.out, case.label, rows, _walls(found, case), found.places), *studied(found.out, case.about),
             _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from pyarrow import ArrowException
 from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import COLUMNS, Row, Word
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.grid import by
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.runs.files import listed
@@ -36,6 +37,7 @@ class CaseFiles:
         about: what is known of it; of the truth, where there is one.
         paths: files of its motions, truth first.
         missing: sentences on motions that should be there and cannot be read.
+        places: of the engines of all cases, from 1 on: they decide how an engine looks.
     """
 
     label: str
@@ -43,10 +45,15 @@ class CaseFiles:
     about: Mapping[str, Any]
     paths: tuple[Path, ...]
     missing: tuple[str, ...]
+    places: Mapping[str, int]
 
     def traces(self) -> list[Trace]:
         """The motions themselves."""
-        return [load(path) for path in self.paths]
+        return [self._placed(load(path)) for path in self.paths]
+
+    def _placed(self, trace: Trace) -> Trace:
+        place = self.places.get(label(trace))
+        return trace if place is None else replace(trace, about={**trace.about, "place": place})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +67,7 @@ class Results:
         told: provenance.
         cases: in the order of their verdicts.
         walls: (case:variant, engine:profile) -> run time, s.
+        places: of the engines, from 1 on: they decide how an engine looks.
     """
 
     out: Path
@@ -69,6 +77,7 @@ class Results:
     told: Mapping[str, Any]
     cases: tuple[CaseFiles, ...]
     walls: Mapping[tuple[str, str], float]
+    places: Mapping[str, int]
     base: Sequence[Row] | None = None
     base_name: str = ""
 
@@ -92,7 +101,7 @@ def read(out: Path, against: Path | None = None) -> Results:
     base = None if against is None else verdicts_of(against)
     return Results(
         out=out, verdicts=verdicts, rows=by(verdicts, "label"), audits=audits, told=told,
-        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, base=base,
+        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, places=places_of(verdicts), base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
 
@@ -115,6 +124,12 @@ def verdicts_of(out: Path) -> list[Row]:
     ]
 
 
+def places_of(verdicts: Sequence[Row]) -> dict[str, int]:
+    """Engines with a row, whether they ran or not, in the order of their rows."""
+    names = dict.fromkeys(row["who"] for row in verdicts if row["engine"] != TRUTH)
+    return {who: i for i, who in enumerate(names, start=1)}
+
+
 def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], Times]:
     """Every case that has a verdict or a motion, and the run times with what each engine took in all."""
     paths: dict[str, list[Path]] = {}
@@ -134,6 +149,7 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
         paths.setdefault(label, []).append(path)
         abouts.setdefault(label, about)
         times[label, who] = told["wall_s"], about.get("took_s")
+    places = places_of(verdicts)
     labels = dict.fromkeys([*(row["label"] for row in verdicts), *paths])
     ran = by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
     wanted = {label: list(dict.fromkeys(row["who"] for row in rows)) for label, rows in ran.items()}
@@ -141,7 +157,7 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
         CaseFiles(
             label=label, page=f"case-{file_name(label)}", about=abouts.get(label, {}),
             paths=tuple(paths.get(label, ())),
-            missing=_missing(label, wanted.get(label, []), times, broken),
+            missing=_missing(label, wanted.get(label, []), times, broken), places=places,
         ) for label in labels
     )  # fmt: skip
     return found, times
