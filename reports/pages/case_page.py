@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports import sections
-from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
+from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import label, style
 from crossbody.reports.judging.told import beyond, share
 from crossbody.reports.judging.verdict import Row, Word
@@ -112,12 +112,10 @@ def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[S
     if not traces:
         return []
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
-    drawn = {name: draw(traces, points, limits) for name, (_, draw) in figures.FIGURES.items() if suits(name, traces)}
+    drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES if suits(name, traces)}
     return [
-        Section(
-            name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces),
-            plots=(Plot(name=f"plot-{name}", figure=figure, time=True),),
-        ) for name, figure in drawn.items() if figure["data"]
+        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces), plots=plots)
+        for name, plots in drawn.items() if plots
     ]  # fmt: skip
 
 

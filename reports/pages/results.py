@@ -125,8 +125,8 @@ def verdicts_of(out: Path) -> list[Row]:
 
 
 def places_of(verdicts: Sequence[Row]) -> dict[str, int]:
-    """Engines with a row, whether they ran or not, in the order of their rows."""
-    names = dict.fromkeys(row["who"] for row in verdicts if row["engine"] != TRUTH)
+    """Engines that ran on some case, in the order of their rows."""
+    names = dict.fromkeys(row["who"] for row in verdicts if row["engine"] != TRUTH and row["verdict"] != Word.SKIPPED)
     return {who: i for i, who in enumerate(names, start=1)}
 
 

@@ -27,7 +27,6 @@ MODE_COLOURS = {
     Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
 }  # fmt: skip
 LONGEST = 150  # intervals of one mode in one bar; of more, the longest are drawn
-MOST_CONTACTS = 8
 
 
 class Sheet:
@@ -159,20 +158,19 @@ def _times(t: Floats) -> Floats:
     return t.astype(np.float32) if smallest > FINE * abs(t[-1]) else t
 
 
-def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None) -> Figure:
-    """One strip a contact and engine; contacts that are in one mode throughout are named instead."""
-    moving, still = changing(traces)
+def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None, which: Sequence[int] = ()) -> Figure:
+    """One strip a contact and engine, of contacts whose modes change."""
+    moving = [(k, contact) for k, contact in changing(traces)[0] if not which or k in which]
     bars: list[dict[str, Any]] = []
     shown: set[int] = set()
-    for k, contact in reversed(moving[:MOST_CONTACTS]):
+    for k, contact in reversed(moving):
         for trace in reversed(traces):
             for mode, spans in _by_mode(trace.run, k).items():
                 name = label(trace) if len(moving) == 1 else f"{contact}, {label(trace)}"
                 bars.append(_bar(trace, name, mode, spans[:LONGEST]) | {"showlegend": mode not in shown})
                 shown.add(mode)
-    named = f". Throughout, in every engine: {', '.join(still)}" if still else ""
     layout = {
-        "title": {"text": f"Modes of the state machine{named}"}, "barmode": "overlay", "bargap": 0.25,
+        "title": {"text": "Modes of the state machine"}, "barmode": "overlay", "bargap": 0.25,
         "height": 150 + 18 * len({bar["y"][0] for bar in bars}),
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
         "xaxis": {"title": {"text": "time [s]"}, "range": [0.0, float(traces[0].run.t[-1])]},
@@ -181,16 +179,24 @@ def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None)
     return {"data": bars, "layout": layout}
 
 
-def changing(traces: Sequence[Trace]) -> tuple[list[tuple[int, str]], list[str]]:
-    """Contacts (index, name) whose mode changes or differs among engines, and "name MODE" of the others."""
+def changing(traces: Sequence[Trace]) -> tuple[list[tuple[int, str]], list[tuple[str, str]]]:
+    """Contacts (index, name) whose mode changes or differs among engines, and name and mode of the others."""
     moving, still = [], []
     for k, contact in enumerate(traces[0].about["contacts"]):
         seen = {int(m) for trace in traces for m in np.unique(trace.run.mode[:, k]) if m >= 0}
         if len(seen) > 1:
             moving.append((k, contact))
         else:
-            still += [f"{contact} {Mode(m).name}" for m in seen]
+            still += [(contact, Mode(m).name) for m in seen]
     return moving, still
+
+
+def alike(traces: Sequence[Trace]) -> list[list[int]]:
+    """Contacts whose mode changes or differs, those together that are in the same modes in every engine."""
+    found: dict[tuple[bytes, ...], list[int]] = {}
+    for k, _ in changing(traces)[0]:
+        found.setdefault(tuple(trace.run.mode[:, k].tobytes() for trace in traces), []).append(k)
+    return list(found.values())
 
 
 def _bar(trace: Trace, name: str, mode: Mode, spans: Sequence[tuple[float, float]]) -> dict[str, Any]:

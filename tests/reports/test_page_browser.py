@@ -75,6 +75,7 @@ DRAWN = "[...document.querySelectorAll('.plot')].filter((box) => 'drawn' in box.
 
 
 def draw_all(browser: chromium.Browser) -> None:
+    browser.js("document.querySelectorAll('.fold').forEach((each) => { each.open = true; })")
     browser.js("document.querySelectorAll('.plot').forEach((box) => box.scrollIntoView())")
     browser.wait(
         "[...document.querySelectorAll('.plot')].every((box) => { if (!('drawn' in box.dataset)) box.scrollIntoView();"
@@ -445,4 +446,28 @@ def test_engines_are_laid_over_each_other_and_side_by_side_in_space(solids: Path
     assert seen(hidden) == beside
     draw_all(browser)
     assert browser.js('document.querySelectorAll(\'[data-attr="sendChartToCloud"], [data-title*="loud"]\').length') == 0
+    assert browser.complaints() == []
+
+
+def test_what_is_folded_is_drawn_when_it_is_asked_for(solids: Path, browser: chromium.Browser) -> None:
+    """It takes part in the shared clock and in print from then on."""
+    browser.open(solids)
+    fold = "document.querySelector('.fold')"
+    browser.js(f"{fold}.scrollIntoView()")
+    browser.wait(DRAWN)
+    assert browser.js("[...document.querySelectorAll('.fold .plot')].some((box) => 'drawn' in box.dataset)") is False
+    browser.js(f"{fold}.querySelector('summary').click()")
+    browser.wait(f"'drawn' in {fold}.querySelector('.plot').dataset")
+    browser.js(f"{fold}.querySelector('.plot').scrollIntoView()")
+    browser.js(NEXT_FRAME)
+    browser.js(
+        "(() => { const clock = document.querySelector('[data-clock]'); clock.value = 500;"
+        " clock.dispatchEvent(new Event('input')); })()"
+    )
+    browser.wait(f"getComputedStyle({fold}.querySelector('.cursor')).visibility === 'visible'")
+    browser.js("dispatchEvent(new Event('beforeprint'))")
+    assert browser.js("[...document.querySelectorAll('.fold')].every((each) => each.open)")
+    browser.wait("[...document.querySelectorAll('.plot')].every((box) => 'drawn' in box.dataset)")
+    browser.js("dispatchEvent(new Event('afterprint'))")
+    assert browser.js("[...document.querySelectorAll('.fold')].filter((each) => each.open).length") == 1
     assert browser.complaints() == []

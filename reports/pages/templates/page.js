@@ -157,13 +157,13 @@ const crossbody = (() => {
 })();
 
 (() => {
-  // On paper: light, every table open.
+  // On paper: light, everything open.
   const root = document.documentElement;
   let [kept, opened] = ["", []];
   addEventListener("beforeprint", () => {
     kept = root.dataset.theme;
     root.dataset.theme = "light";
-    opened = [...document.querySelectorAll("details.table:not([open])")];
+    opened = [...document.querySelectorAll("details:is(.table, .fold):not([open])")];
     opened.forEach((each) => { each.open = true; });
     crossbody.tell("theme");
   });
