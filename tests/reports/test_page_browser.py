@@ -241,6 +241,18 @@ def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium
         assert drawn > 10
 
 
+@pytest.mark.parametrize(("t_end", "far"), [(0.1, False), (2.0, True)])
+def test_a_body_that_goes_far_is_followed(tmp_path: Path, browser: chromium.Browser, t_end: float, far: bool) -> None:
+    """It would be a few pixels of the way that it falls."""
+    body = Body(name="ball", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+    ball = Shape(name="ball", body="ball", type="sphere", size=(0.1, 0.0, 0.0))
+    scene = Scene(bodies=(body,), joints=(Joint(name="free", body="ball", type="free"),), shapes=(ball,))
+    case = from_scene(scene, q0=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], t_end=t_end)
+    browser.open(page_of(case, tmp_path / "out", load_engine("reference").prepare(case, "compiled")))
+    browser.wait("document.querySelector('[data-speed]').options.length > 0")
+    assert browser.js("document.querySelector('[data-follow]').checked") is far
+
+
 FRAMES = """new Promise((done) => {
     const draw = requestAnimationFrame, began = performance.now();
     let [frames, busy] = [0, 0];

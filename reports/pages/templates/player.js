@@ -314,7 +314,7 @@
       else redraw();
     };
 
-    if (follow && moving.length) follow.checked = wide > FAR * across(standing(0));
+    if (follow && moving.length) follow.checked = Math.hypot(...wide) > FAR * Math.hypot(...across(standing(0)));
     const usual = nice((end || 1) / 10);
     for (const factor of [0.01, 0.1, 0.2, 0.5, 1, 2, 5]) {
       const option = new Option(`${shortNumber(usual * factor)} × real time`, usual * factor, factor === 1, factor === 1);
