@@ -14,6 +14,7 @@ from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.scale import energy as energy_of
+from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.sheet import Sheet, alike, changing, modes
@@ -195,8 +196,9 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
             sheet.clip(3 * place, *ends)
             for who, size in far.items():
                 sheet.beyond(who, size, force_unit(traces, k), contacts[k])
+        total = float(np.nanmax(np.abs(summed[0]), initial=idle(traces[0].run) * float(traces[0].run.t[-1])))
         for limit, name in limits.get("lam_impulse_path", {}).items():
-            sheet.limit(3 * place + 2, limit * float(np.nanmax(np.abs(summed[0]), initial=0.0)), name)
+            sheet.limit(3 * place + 2, limit * total, name)
     sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
 
@@ -227,13 +229,18 @@ def force_unit(traces: Sequence[Trace], k: int) -> str:
     return "N m" if traces[0].about["contacts"][k] in traces[0].about.get("turning", ()) else "N"
 
 
-def carrying(traces: Sequence[Trace]) -> list[int]:
-    """Contacts that carry a force in any motion, more than rounding."""
+def carrying(traces: Sequence[Trace], least: float = 0.0) -> list[int]:
+    """Contacts that carry a force in any motion, more than rounding and than the least, N."""
     lam = [np.abs(np.nan_to_num(trace.run.lam)).max(axis=0, initial=0.0) for trace in traces]
     largest = np.max(lam, axis=0, initial=0.0)
+    noise = max(IDLE * float(np.max(largest, initial=0.0)), _noise(traces), least)
+    return [int(k) for k in np.flatnonzero(largest > noise)]
+
+
+def _noise(traces: Sequence[Trace]) -> float:
+    """A force of rounding, of that which the energy makes over the way, N."""
     way = max(traces[0].about.get("scales", ()), default=0.0) or 1.0
-    usual = max(float(np.max(largest, initial=0.0)), energy_of(traces[0].run) / way)
-    return [int(k) for k in np.flatnonzero(largest > IDLE * usual)]
+    return IDLE * energy_of(traces[0].run) / way
 
 
 def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, dict[str, float]]:
@@ -245,7 +252,7 @@ def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None,
     low, high = ends.get(TRUTH, (0.0, 0.0))
     reach = max(high, -low)
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
-    if not far or reach == 0.0:
+    if not far or reach <= _noise(traces):
         return None, {}
     return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), far
 
@@ -342,8 +349,8 @@ def note(name: str, traces: Sequence[Trace]) -> str:
         names, found = _names(traces, noun), order(traces)
         if len(found) > MOST_SIGNALS:
             told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
-        if name in IDLE_NOTES and (idle := [names[k] for k in range(len(names)) if k not in found]):
-            told.append(f"{IDLE_NOTES[name]}: {few(idle)}.")
+        if name in IDLE_NOTES and (rest := [names[k] for k in range(len(names)) if k not in found]):
+            told.append(f"{IDLE_NOTES[name]}: {few(rest)}.")
     if name == "modes":
         told += [*_same(traces), *_throughout(traces)]
     return " ".join(filter(None, told))

@@ -14,6 +14,7 @@ from crossbody.cases import InvalidValue
 from crossbody.cases.arrays import Floats
 from crossbody.reports import scenes
 from crossbody.reports.figures.styles import style
+from crossbody.reports.measuring.scale import idle
 from crossbody.reports.pages.figures import carrying
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace
@@ -50,7 +51,7 @@ class Film:
         self.t, self.q = filled(trace.run, trace.quaternions)
         self.color = style(trace, i)["color"]
         self.lam = np.zeros_like(trace.run.lam)
-        bearing = carrying([trace])
+        bearing = carrying([trace], idle(trace.run))
         self.lam[:, bearing] = np.nan_to_num(trace.run.lam[:, bearing])
         self.force = float(np.max(np.abs(self.lam), initial=0.0))
         some = np.unique(np.linspace(0, len(self.q) - 1, 40).astype(int))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ MODE_COLOURS = {
     Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
     Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
 }  # fmt: skip
+LINE = 20  # letters of a title in one line
 LONGEST = 150  # intervals of one mode in one bar; of more, the longest are drawn
 
 
@@ -141,12 +143,21 @@ def _level(axis: str, value: float, name: str) -> dict[str, Any]:
     return {"type": "line", "layer": "below", "line": line, "label": label} | ends
 
 
+def _lines(name: str) -> str:
+    """The title of an axis and its unit: a long one in more lines, no longer than a plot is high."""
+    text, _, unit = plain(name).partition("\n")
+    if len(text) <= LINE:
+        return f"{text}<br>{unit}" if unit else text
+    whole = unit.replace(" ", "\u00a0")
+    return "<br>".join(wrap(f"{text} {whole}", LINE, break_on_hyphens=False))
+
+
 def _pair(n: str, name: str, domain: list[float], timed: bool) -> dict[str, Any]:
     """The two axes of one plot."""
     x: dict[str, Any] = {"anchor": f"y{n}", "domain": [0.0, 1.0], "showticklabels": timed}
     if n:
         x["matches"] = "x"
-    title = {"text": plain(name).replace("\n", "<br>"), "standoff": 14, "font": {"size": 12}}
+    title = {"text": _lines(name), "standoff": 14, "font": {"size": 12}}
     y = {"anchor": f"x{n}", "domain": domain, "title": title, "exponentformat": "e", "tickfont": {"size": 10.5}}
     return {f"xaxis{n}": x, f"yaxis{n}": y}
 

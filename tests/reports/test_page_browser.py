@@ -379,10 +379,13 @@ def test_every_page_is_quiet_fits_and_has_no_violation(whole: Path, browser: chr
 CROSSED = """[...document.querySelectorAll('.plot')].flatMap((plot) => {
     const boxes = (kind) => [...plot.querySelectorAll(kind)].map((each) => each.getBoundingClientRect());
     const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
-    const ticks = boxes('.xtick text');
-    return boxes('[class*="g-x"] text').some((title) => ticks.some((tick) => meet(title, tick))) ? [plot.id] : [];
+    const titles = boxes('[class*="g-y"] text');
+    if (titles.some((one, i) => titles.slice(0, i).some((two) => meet(one, two)))) return [plot.id];
+    const over = (axis) => boxes(`[class*="g-${axis}"] text`).some(
+        (title) => boxes(`.${axis}tick text`).some((tick) => meet(title, tick)));
+    return ['x', 'y'].some(over) ? [plot.id] : [];
 })"""
-"""Plots where the title of an axis lies over the labels of its ticks."""
+"""Plots where the title of an axis lies over another one or over the labels of its ticks."""
 
 
 def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[str]:
@@ -392,7 +395,7 @@ def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[
     found = browser.complaints()
     if not browser.js("document.documentElement.scrollWidth <= innerWidth"):
         found.append("wider than the window")
-    found += [f"{name}: title over ticks" for name in browser.js(CROSSED)]
+    found += [f"{name}: titles over ticks" for name in browser.js(CROSSED)]
     if AXE is None or AXE.origin is None or width != 1400:
         return found
     browser.js(f"{Path(AXE.origin).with_name('axe.min.js').read_text(encoding='utf-8')}; 0")
@@ -483,3 +486,13 @@ def test_what_is_folded_is_drawn_when_it_is_asked_for(solids: Path, browser: chr
     browser.js("dispatchEvent(new Event('afterprint'))")
     assert browser.js("[...document.querySelectorAll('.fold')].filter((each) => each.open).length") == 1
     assert browser.complaints() == []
+
+
+def test_long_names_lie_over_nothing(tmp_path: Path, browser: chromium.Browser) -> None:
+    solid = {"mass": 1.0, "com": (0.0, 0.0, -0.3), "inertia": (0.1, 0.1, 0.01, 0.0, 0.0, 0.0)}
+    names = [f"{side}_spring_link_joint_of_the_gripper" for side in ("left", "right", "middle")]
+    bodies = tuple(Body(name=name, **solid) for name in names)
+    joints = tuple(Joint(name=n, body=n, type="hinge", axis=(0.0, 1.0, 0.0), range=(-0.2, 3.0)) for n in names)
+    case = from_scene(Scene(bodies=bodies, joints=joints), q0=[0.5, 0.6, 0.7], t_end=0.5)
+    page = page_of(case, tmp_path / "out", load_engine("reference").prepare(case, "compiled"))
+    assert {width: found for width in (1400, 400) if (found := look(browser, page, width, "light"))} == {}

@@ -215,3 +215,17 @@ def test_where_no_force_of_the_truth_is_known_no_error_of_an_impulse_is_drawn(ru
     lead = replace(trace(blind), truth=None)
     drawn = force([lead, Trace(about=lead.about | {"engine": "seeing"}, run=run, truth=blind)])
     assert [text.partition("<br>")[0] for text in axis_titles(drawn)] == ["lam floor", "impulse"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_force_of_rounding_in_the_truth_sets_neither_scale_nor_limit(run: Trajectory, seed: int) -> None:
+    """Couplings of a robot that falls freely carry 1e-16 N m: what others carry is not off a scale of that."""
+    size = float(10.0 ** np.random.default_rng(seed).uniform(-20.0, -12.0))
+    idles = replace(run, lam=size * run.lam, ledger=None, events=())
+    lead, bears = trace(idles), trace(replace(run, lam=1e-3 * run.lam, ledger=None, events=()), "bears")
+    drawn = force([lead, replace(bears, truth=idles)], limits={"lam_impulse_path": {1e-6: "limit"}})
+    assert "Off scale" not in drawn["layout"]["title"]["text"]
+    assert "range" not in drawn["layout"]["yaxis"]
+    (limit,) = drawn["layout"]["shapes"]
+    weight = 9.81 * 1.0  # of the ball, which a thousandth counts as none
+    assert limit["y0"] > 1e-6 * 1e-4 * weight * float(run.t[-1])

@@ -28,7 +28,10 @@
     if (innerWidth < 600) {
       out.margin = { ...out.margin, l: 58, r: 6 };
       out.font = { ...out.font, size: 10 };
-      for (const key of axes(out)) if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
+      for (const key of axes(out)) {
+        if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
+        if (key[0] === "y") out[key] = { ...out[key], automargin: true, title: { ...out[key].title, standoff: 4 } };
+      }
     }
     return out;
   };
