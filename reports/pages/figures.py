@@ -181,7 +181,8 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
     rows = [text.format(contacts[k], force_unit(traces, k)) for k in shown for text in each]
     sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference from the truth|", points, group=3)
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
-    floor = floor_of(summed[0])
+    total = float(np.nanmax(np.abs(summed[0]), initial=idle(traces[0].run) * float(traces[0].run.t[-1])))
+    floor = floor_of(np.array([total]))
     true = [true_impulse(trace, traces[0], summed[0]) for trace in traces]
     for place, k in enumerate(shown):
         for i, trace in enumerate(traces):
@@ -196,7 +197,6 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
             sheet.clip(3 * place, *ends)
             for who, size in far.items():
                 sheet.beyond(who, size, force_unit(traces, k), contacts[k])
-        total = float(np.nanmax(np.abs(summed[0]), initial=idle(traces[0].run) * float(traces[0].run.t[-1])))
         for limit, name in limits.get("lam_impulse_path", {}).items():
             sheet.limit(3 * place + 2, limit * total, name)
     sheet.logarithmic(*range(2, len(rows), 3))

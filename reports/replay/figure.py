@@ -124,7 +124,7 @@ def _broken(line: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
 
 def _line(x: Floats, y: Floats, name: str, place: int, i: int = 0) -> dict[str, Any]:
     """One line; its name stands in the legend once."""
-    look = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.5}
+    look = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[max(i - 1, 0) % len(DASHES)], "width": 1.5}
     axis = number(place)
     return {
         "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)),
