@@ -74,7 +74,11 @@ crossbody.solids = (() => {
       g.lineJoin = r ? "miter" : "round"; // a round outline is smooth as it is
       g.lineWidth = look.width;
       g.stroke();
+      if (!faces.length) continue;
+      const dashes = g.getLineDash();
+      g.setLineDash([]); // edges inside an outline are thin, and dashes cost more than lines
       g.lineWidth = 0.6 * look.width;
+      g.beginPath();
       for (const face of faces) {
         const corners = face.map((i) => points[i]);
         const area = corners.reduce((sum, p, i) => {
@@ -82,10 +86,11 @@ crossbody.solids = (() => {
           return sum + p[0] * next[1] - p[1] * next[0];
         }, 0);
         if (area > 0) continue; // turned away
-        trace(g, corners);
+        corners.forEach(([x, y], i) => (i ? g.lineTo(x, y) : g.moveTo(x, y)));
         g.closePath();
-        g.stroke();
       }
+      g.stroke();
+      g.setLineDash(dashes);
     }
   };
   const bones = (g, pairs, frames, to) => {
