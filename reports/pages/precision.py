@@ -72,7 +72,7 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapp
             "hovertemplate": "%{text}<br>error %{x:.2g}, %{y:.3g} ms<extra>" + plain(who) + "</extra>",
             "marker": _mark(places[who]) | {"size": 9, "opacity": 0.8},
         }
-        for who, mine in points.items()
+        for who, mine in sorted(points.items(), key=lambda one: places[one[0]])
     ]  # fmt: skip
     every = [one for mine in points.values() for one in mine]
     layout = {

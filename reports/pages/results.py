@@ -13,7 +13,7 @@ from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import COLUMNS, Row, Word
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.grid import by
+from crossbody.reports.pages.grid import by, names
 from crossbody.reports.pages.html import file_name
 from crossbody.reports.runs.files import listed
 from crossbody.reports.runs.output import is_staged, recover
@@ -125,9 +125,10 @@ def verdicts_of(out: Path) -> list[Row]:
 
 
 def places_of(verdicts: Sequence[Row]) -> dict[str, int]:
-    """Engines that ran on some case, in the order of their rows."""
-    names = dict.fromkeys(row["who"] for row in verdicts if row["engine"] != TRUTH and row["verdict"] != Word.SKIPPED)
-    return {who: i for i, who in enumerate(names, start=1)}
+    """Engines that ran on some case, in the order of their rows, profiles of one engine side by side."""
+    ran = {row["who"] for row in verdicts if row["verdict"] != Word.SKIPPED}
+    found = [who for who in names(row for row in verdicts if row["engine"] != TRUTH) if who in ran]
+    return {who: i for i, who in enumerate(found, start=1)}
 
 
 def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], Times]:
