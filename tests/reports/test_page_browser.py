@@ -19,12 +19,15 @@ from crossbody.cases import from_scene, load
 from crossbody.cases.scene import Body, Joint, Scene, Shape
 from crossbody.engines import load as load_engine
 from crossbody.reports import sections
+from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.pages import site
+from crossbody.reports.pages import figures, html, site
+from crossbody.reports.pages.html import Page
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
+from crossbody.reports.runs.store import Trace
 
 pytestmark = [
     pytest.mark.browser,
@@ -496,3 +499,18 @@ def test_long_names_lie_over_nothing(tmp_path: Path, browser: chromium.Browser) 
     case = from_scene(Scene(bodies=bodies, joints=joints), q0=[0.5, 0.6, 0.7], t_end=0.5)
     page = page_of(case, tmp_path / "out", load_engine("reference").prepare(case, "compiled"))
     assert {width: found for width in (1400, 400) if (found := look(browser, page, width, "light"))} == {}
+
+
+def test_long_numbers_lie_over_nothing(tmp_path: Path, browser: chromium.Browser) -> None:
+    """An energy that hardly changes has many digits beside its axis."""
+    run = truth_of(load("bouncing_ball", "linear")).trajectory
+    energy = np.c_[0.0 * run.t, -5.0238e-4 - 3e-8 * run.t]
+    figure = figures.energy([Trace(about={"engine": "truth", "profile": ""}, run=replace(run, energy=energy))])
+    section = Section(name="s", title="S", plots=(Plot(name="p", figure=figure),))
+    for name, content in (
+        {"p.html": html.render([Page(name="p", title="P", sections=[section])], (), "")} | html.assets()
+    ).items():
+        (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    assert {
+        width: found for width in (1400, 400) if (found := look(browser, tmp_path / "p.html", width, "light"))
+    } == {}

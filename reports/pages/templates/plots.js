@@ -25,12 +25,13 @@
       for (const key of keys) at = at[key] ??= {};
       at[last] = value;
     }
+    for (const key of axes(out)) if (key[0] === "y") out[key] = { ...out[key], automargin: true }; // titles beside long ticks
     if (innerWidth < 600) {
       out.margin = { ...out.margin, l: 58, r: 6 };
       out.font = { ...out.font, size: 10 };
       for (const key of axes(out)) {
         if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
-        if (key[0] === "y") out[key] = { ...out[key], automargin: true, title: { ...out[key].title, standoff: 4 } };
+        if (key[0] === "y") out[key].title = { ...out[key].title, standoff: 4 };
       }
     }
     return out;
