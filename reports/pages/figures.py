@@ -305,7 +305,8 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     floor, usual = floor_of(traces[0].run.t), list[Floats]()
     for i, trace in enumerate(traces):
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
-        sheet.line(trace, i, 0, np.maximum(lengths, floor), starts, shape="hv")
+        ends = starts[-1:] + lengths[-1:]  # the last step is drawn to its end too
+        sheet.line(trace, i, 0, np.maximum(np.r_[lengths, lengths[-1:]], floor), np.r_[starts, ends], shape="hv")
         usual += [np.quantile(lengths, (REMAINDERS, 1.0))] if len(lengths) else []
     sheet.logarithmic(0)
     if usual:
