@@ -116,7 +116,8 @@ def verdicts_of(out: Path) -> list[Row]:
         versions = table.get("provenance", {}).get("versions", {})
         by = versions.get("crossbody", "another version") if isinstance(versions, dict) else "another version"
         raise OutputError(
-            f"{out} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; run the cases again."
+            f"{out / 'verdicts.json'} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; "
+            "run the cases again."
         )
     check_fields(out / "verdicts.json", rows, JUDGED)
     return [
