@@ -21,7 +21,9 @@ def work_precision(rows: pd.DataFrame) -> Figure:
     finite = error[np.isfinite(error) & (error > 0.0)]
     edge = 10.0 * float(finite.max()) if len(finite) else 1.0
     floor = 1e-16
-    for i, ((case, engine, profile), group) in enumerate(rows.groupby(["case", "engine", "profile"], sort=False)):
+    for i, ((case, engine, profile), group) in enumerate(
+        rows.groupby(["case", "engine", "profile"], sort=False), start=1
+    ):
         failed = ~np.isfinite(group["error"].astype(float))
         x = group["error"].astype(float).where(~failed, edge).clip(lower=floor)
         label = f"{engine}:{profile}" if rows["case"].nunique() == 1 else f"{case} {engine}:{profile}"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
 import click
 
 from crossbody.reports import layout, voice
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import EngineRun, runs_of, sentence
+from crossbody.reports.judging.told import EngineRun, beyond, runs_of, sentence
 from crossbody.reports.judging.verdict import Regression, Row, Word
 from crossbody.reports.layout import unit_text
 from crossbody.reports.pages.results import Times
@@ -19,15 +19,25 @@ from crossbody.reports.pages.results import Times
 MANY = 4  # cases that are named of those that an engine could not run
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
-COLOURS = {"within": "green", "known": "yellow", "outside": "red"}
+COUNTED: dict[str, Callable[[Row], bool]] = {
+    "within": lambda row: row["verdict"] == Word.WITHIN,
+    "known": lambda row: row["verdict"] == Word.EXPECTED,
+    "beyond": beyond,
+    "outside": lambda row: row["verdict"] == Word.OUTSIDE,
+}
+"""Rows that are counted in the table by the heads of their columns."""
+COLOURS = {"within": "green", "known": "yellow", "beyond": "yellow", "outside": "red"}
 EMPTY = {"-", "0", ""}  # cells that say nothing
-LEFT_OUT = ("in all [s]", "importer", "within", "step", "model", "known", "time [ms]")
+LEFT_OUT = ("in all [s]", "importer", "within", "step", "model", "known", "beyond", "time [ms]")
 """Columns that go, in this order, where the table is too wide."""
 
 
 def counted(rows: Sequence[Row]) -> str:
-    """Return how many rows have each verdict."""
-    return ", ".join(f"{count} {word}" for word, count in Counter(row["verdict"] for row in rows).most_common())
+    """Return how many rows have each verdict, and how many that are not judged are beyond a limit."""
+    loose = sum(map(beyond, rows))
+    more = {Word.INFO: f" ({loose} beyond a limit)"} if loose else {}
+    found = Counter(row["verdict"] for row in rows).most_common()
+    return ", ".join(f"{count} {word}{more.get(word, '')}" for word, count in found)
 
 
 def show(rows: Sequence[Row], times: Times) -> None:
@@ -77,8 +87,8 @@ def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:
     walls = [times.get((run.label, run.who), (None, None)) for run in runs]
     columns["time [ms]"] = [_number(None if wall is None else 1e3 * wall) for wall, _ in walls]
     columns["in all [s]"] = [_number(whole) for _, whole in walls]
-    for name, word in (("within", Word.WITHIN), ("known", Word.EXPECTED), ("outside", Word.OUTSIDE)):
-        columns[name] = [str(sum(row["verdict"] == word for row in run.rows)) for run in runs]
+    for name, counts in COUNTED.items():
+        columns[name] = [str(sum(map(counts, run.rows))) for run in runs]
     columns = {name: cells for name, cells in columns.items() if name == "outside" or set(cells) - EMPTY}
     return layout.laid_out(
         [run.who.removesuffix(":") for run in runs], columns, width, above=[run.label for run in runs],

@@ -73,11 +73,13 @@ class Plot:
         name: its id on the page.
         figure: every axis with its unit; its title becomes the caption.
         time: whether x is the time of a case's runs: then it shares cursor, zoom and clock with the others.
+        folded: what it shows, if it is closed at first and drawn when it is opened.
     """
 
     name: str
     figure: Figure | Written
     time: bool = False
+    folded: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -92,7 +92,8 @@ class Entry:
         own: truth of the equations that the engine really integrates; None where they are the case's own.
         hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
         crashed: what it threw, where it did not come back with an outcome.
-        took_s: what all of that took, preparation and the runs that tell the parts of its error too, s.
+        took_s: what all of that took, s: preparation and the runs that tell the parts of its error too,
+            compilation aside.
     """
 
     engine: str

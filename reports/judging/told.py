@@ -51,9 +51,8 @@ class EngineRun:
     @property
     def unbounded(self) -> Row | None:
         """The number beyond its limit that may be so, unknown how far: of position if there is one."""
-        loose = [row for row in self.rows if row["verdict"] == Word.INFO and (row["limit"] or 0.0) > 0.0]
-        beyond = [row for row in loose if 1.0 < share(row) < math.inf]
-        return max(beyond, key=lambda row: (row["metric"] == "position", share(row)), default=None)
+        found = filter(beyond, self.rows)
+        return max(found, key=lambda row: (row["metric"] == "position", share(row)), default=None)
 
     @property
     def skipped(self) -> bool:
@@ -67,6 +66,11 @@ def runs_of(rows: Iterable[Row]) -> list[EngineRun]:
     for row in rows:
         found.setdefault((f"{row['case']}:{row['variant']}", f"{row['engine']}:{row['profile']}"), []).append(row)
     return [EngineRun(label, who, mine) for (label, who), mine in found.items()]
+
+
+def beyond(row: Row) -> bool:
+    """Whether a number is beyond its limit for a known cause, but not judged: nobody knows how far it may be."""
+    return row["verdict"] == Word.INFO and (row["limit"] or 0.0) > 0.0 and 1.0 < share(row) < math.inf
 
 
 def share(row: Row) -> float:
@@ -87,21 +91,33 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
     right = [run for run in ran if not run.wrong]
     known = [run.who for run in right if run.deviates]
-    beyond = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
-    text = f"{len(right) - len(known) - len(beyond)} of {len(ran)} runs are within all limits"
-    verb = "deviates" if len(known) == 1 else "deviate"
-    text += f", {len(known)} {verb} as expected ({', '.join(dict.fromkeys(known))})." if known else "."
+    loose = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
+    text = _counted(len(right) - len(known) - len(loose), len(ran), known)
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     if off:
         text += f" Off: {_named([_off(run, run.wrong[0]) for run in off])}."
-    if beyond:
-        beyond.sort(key=lambda one: -share(one[1]))
-        text += f" Off by a known cause without a bound: {_named([_off(*one) for one in beyond])}."
+    if loose:
+        loose.sort(key=lambda one: -share(one[1]))
+        text += f" Beyond a limit for a known cause, and not judged: {_named([_off(*one) for one in loose])}."
     short = [(run.label, row) for run in runs for row in run.rows if row["metric"] == TRUTH and row["compared"] < 1.0]
     if short:
         text += f" Compared as far as the truth is known: {_named([f'{at}, {_part(row)}' for at, row in short])}."
     return text
+
+
+def _counted(within: int, ran: int, known: Sequence[str]) -> str:
+    """How many of the runs are within all limits, and which deviate as expected."""
+    if ran == 1:
+        text = f"The run {'is' if within else 'is not'} within all limits"
+    else:
+        text = f"{within} of {ran} runs {'is' if within == 1 else 'are'} within all limits"
+    if not known:
+        return f"{text}."
+    whom = ", ".join(dict.fromkeys(known))
+    if ran == 1:
+        return f"The run deviates as expected ({whom})."
+    return f"{text}, {len(known)} {'deviates' if len(known) == 1 else 'deviate'} as expected ({whom})."
 
 
 def _part(row: Row) -> str:

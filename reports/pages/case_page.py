@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports import sections
-from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
+from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import label, style
-from crossbody.reports.judging.told import share
+from crossbody.reports.judging.told import beyond, share
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.figures import suits
@@ -50,7 +50,7 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
             *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
-            *precision(found.out, case.label, rows, _walls(found, case)), *studied(found.out, case.about),
+            *precision(found.out, case.label, rows, _walls(found, case), found.places), *studied(found.out, case.about),
             _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
@@ -93,7 +93,8 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": rows, "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
+            "rows": [row | {"beyond": beyond(row)} for row in rows],
+            "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
             "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
         },
@@ -103,19 +104,18 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
 def _far(row: Row) -> tuple[int, float]:
     """The worst word first, and of one word what is farthest out."""
     word = row["verdict"]
-    return (grid.WORST.index(word), -share(row)) if word in grid.WORST else (len(grid.WORST), 0.0)
+    known = word in grid.WORST or beyond(row)
+    return (grid.RANKED.index(word), -share(row)) if known else (len(grid.RANKED), 0.0)
 
 
 def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[Section]:
     if not traces:
         return []
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
-    drawn = {name: draw(traces, points, limits) for name, (_, draw) in figures.FIGURES.items() if suits(name, traces)}
+    drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES if suits(name, traces)}
     return [
-        Section(
-            name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces),
-            plots=(Plot(name=f"plot-{name}", figure=figure, time=True),),
-        ) for name, figure in drawn.items() if figure["data"]
+        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces), plots=plots)
+        for name, plots in drawn.items() if plots
     ]  # fmt: skip
 
 

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
-from crossbody.reports.figures.section import Figure
+from crossbody.reports.figures.section import Figure, Plot
 from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.scale import energy as energy_of
+from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.sheet import Sheet, changing, modes
+from crossbody.reports.pages.sheet import Sheet, alike, changing, modes
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import POINTS
 
 SAMPLE = 16  # room of one sample of one line on a page, bytes (time and value as base64)
 FEWEST = 60
 MOST_SIGNALS = 9
-"""Coordinates and contacts drawn of a mechanism that has more; evenly chosen, ends included."""
+"""Coordinates and contacts drawn of a mechanism that has more: those that matter most."""
+FIRST = 3  # of these that are seen at once; the others are drawn when they are asked for
 BEYOND = 1.5  # times the truth's largest force up to which forces are drawn
 NAMED = 6
 """Contacts without a force that are named; a robot has hundreds."""
@@ -50,14 +53,9 @@ def limits_of(rows: Iterable[Row]) -> Limits:
     return told
 
 
-def drawn(count: int) -> list[int]:
-    """Which of so many signals are drawn."""
-    return list(dict.fromkeys(np.linspace(0, count - 1, min(count, MOST_SIGNALS)).round().astype(int).tolist()))
-
-
 def points_for(traces: Sequence[Trace], room: float) -> int:
     """Samples a line so that all lines of a case take `room` bytes."""
-    coordinates, contacts = (len(drawn(len(traces[0].about[name]))) for name in ("coordinates", "contacts"))
+    coordinates, contacts = (min(len(traces[0].about[name]), MOST_SIGNALS) for name in ("coordinates", "contacts"))
     lines = len(traces) * (2 * coordinates + 4 * contacts + 4)
     return int(np.clip(room / (SAMPLE * lines), FEWEST, POINTS))
 
@@ -73,14 +71,78 @@ def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
     return np.maximum(np.abs(mine - theirs), floor)
 
 
-def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
-    """Every coordinate of every engine, and under it log |difference to the truth|, impacts matched."""
+def _most(sizes: Floats, least: float = -1.0) -> list[int]:
+    """Which of some signals are larger than the least, the largest first."""
+    order = np.argsort(-sizes, kind="stable")
+    return [int(k) for k in order if sizes[k] > least]
+
+
+def _largest(parts: Iterable[Floats], count: int) -> Floats:
+    """Of every signal its largest finite size in any run (count,)."""
+    found = np.zeros(count)
+    for part in parts:
+        found = np.maximum(found, np.abs(np.where(np.isfinite(part), part, 0.0)).max(axis=0, initial=0.0))
+    return found
+
+
+def farthest(traces: Sequence[Trace]) -> list[int]:
+    """Coordinates, those first whose errors are the largest of their size; quaternions last, judged by their angle."""
+    count = len(traces[0].about["coordinates"])
+    scales = traces[0].about.get("scales", ()) or _largest((trace.run.q for trace in traces), count)
+    scales = np.where(np.array(scales) > 0.0, scales, 1.0)
+    sizes = _largest(((t.run.q - t.truth.q) / scales for t in traces if t.truth is not None), count)
+    sizes[_turns(traces)] = 0.0
+    return _most(sizes)
+
+
+def _turns(traces: Sequence[Trace]) -> list[int]:
+    """Which coordinates are of quaternions."""
+    return [at + i for at in traces[0].quaternions for i in range(4)]
+
+
+def loads(traces: Sequence[Trace]) -> Floats:
+    """Largest INT |lam| dt of every contact in any run (nc,)."""
+    sums = (np.trapezoid(np.abs(np.nan_to_num(one.run.lam)), one.run.t, axis=0)[None] for one in traces)
+    return _largest(sums, len(traces[0].about["contacts"]))
+
+
+def loaded(traces: Sequence[Trace]) -> list[int]:
+    """Contacts that carry a force, those first that carry most."""
+    bearing, sizes = carrying(traces), loads(traces)
+    return [bearing[i] for i in _most(sizes[bearing])]
+
+
+def deepest(traces: Sequence[Trace]) -> list[int]:
+    """Contacts that are deeper somewhere than rounding, and rows that are always on; the deepest first."""
+    depths = (_depth(trace.run.gap, _always(traces)) for trace in traces)
+    return _most(_largest((np.maximum(depth, 0.0) for depth in depths), len(traces[0].about["contacts"])), ROUNDING)
+
+
+def _always(traces: Sequence[Trace]) -> NDArray[np.bool_]:
+    """Which rows are always on (nc,)."""
+    found: NDArray[np.bool_] = (traces[0].run.mode == Mode.BILATERAL).all(axis=0)
+    return found
+
+
+def _depth(gap: Floats, always: NDArray[np.bool_]) -> Floats:
+    found: Floats = np.where(always, np.abs(gap), -gap)
+    return found
+
+
+def switching(traces: Sequence[Trace]) -> list[int]:
+    """Contacts whose modes change or differ, of those that are alike the first; those first that carry most."""
+    sizes, found = loads(traces), [each[0] for each in alike(traces)]
+    return [found[i] for i in _most(sizes[found])]
+
+
+def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, which: Sequence[int] = ()) -> Figure:
+    """Coordinates of every engine, and under each log |difference to the truth|, impacts matched."""
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
     # One floor a unit: a coordinate that stays at 0 is compared with its neighbours' size.
     floors = {
         unit: floor_of(traces[0].run.q[:, [k for k, (_, u) in enumerate(names) if u == unit]]) for _, unit in names
     }
-    shown = drawn(len(names))
+    shown = which or sorted(farthest(traces)[:MOST_SIGNALS])
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
     sheet = Sheet(rows, "Coordinates, and |difference from the truth|, impacts matched", points, group=2)
     for i, trace in enumerate(traces):
@@ -92,7 +154,7 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
                 sheet.line(trace, i, 2 * place + 1, error)
     scales = traces[0].about.get("scales", ())
     least = min(limits.get("position", {}), default=0.0)
-    turns = {at + i for at in traces[0].quaternions for i in range(4)}  # judged by their angle
+    turns = _turns(traces)
     for place, k in enumerate(shown):
         if k < len(scales) and k not in turns:
             for limit, name in limits.get("position", {}).items():
@@ -111,17 +173,17 @@ def _show_still(sheet: Sheet, row: int, values: Floats, limit: float) -> None:
         sheet.clip(row, middle - reach, middle + reach)
 
 
-def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
+def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, which: Sequence[int] = ()) -> Figure:
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
-    bearing = carrying(traces)
-    shown = [bearing[k] for k in drawn(len(bearing))]
+    shown = which or sorted(loaded(traces)[:MOST_SIGNALS])
     each = ("lam {}\n[{}]", "impulse\n[{1} s]", "|error|\n[{1} s]")
     rows = [text.format(contacts[k], force_unit(traces, k)) for k in shown for text in each]
     sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference from the truth|", points, group=3)
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
-    floor = floor_of(summed[0])
-    true = [None if trace.truth is None else with_collisions(trace.truth, traces[0].run.events) for trace in traces]
+    total = float(np.nanmax(np.abs(summed[0]), initial=idle(traces[0].run) * float(traces[0].run.t[-1])))
+    floor = floor_of(np.array([total]))
+    true = [true_impulse(trace, traces[0], summed[0]) for trace in traces]
     for place, k in enumerate(shown):
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
@@ -136,9 +198,30 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
             for who, size in far.items():
                 sheet.beyond(who, size, force_unit(traces, k), contacts[k])
         for limit, name in limits.get("lam_impulse_path", {}).items():
-            sheet.limit(3 * place + 2, limit * float(np.nanmax(np.abs(summed[0]), initial=0.0)), name)
+            sheet.limit(3 * place + 2, limit * total, name)
     sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
+
+
+def true_impulse(trace: Trace, lead: Trace, whole: Floats) -> Floats | None:
+    """Cumulative impulse of the truth beside every sample of a run (n, nc); NaN where it is not known.
+
+    By the same rule over the same samples, so that the error of the rule cancels. A run whose collisions take no
+    time has too few samples for the forces of a truth whose collisions take some: there the truth's own count.
+
+    Args:
+        trace: the run, and the truth beside it.
+        lead: the truth by itself.
+        whole: its cumulative impulse.
+    """
+    if trace.truth is None:
+        return None
+    same = with_collisions(trace.truth, lead.run.events)
+    if any(event.impulse for event in trace.run.events) and not any(event.impulse for event in lead.run.events):
+        same = np.stack([np.interp(trace.run.t, lead.run.t, row) for row in whole.T], axis=1)
+        same[np.isnan(trace.truth.lam)] = np.nan
+    same[:, np.isnan(trace.truth.lam).all(axis=0)] = np.nan
+    return same
 
 
 def force_unit(traces: Sequence[Trace], k: int) -> str:
@@ -146,13 +229,18 @@ def force_unit(traces: Sequence[Trace], k: int) -> str:
     return "N m" if traces[0].about["contacts"][k] in traces[0].about.get("turning", ()) else "N"
 
 
-def carrying(traces: Sequence[Trace]) -> list[int]:
-    """Contacts that carry a force in any motion, more than rounding."""
+def carrying(traces: Sequence[Trace], least: float = 0.0) -> list[int]:
+    """Contacts that carry a force in any motion, more than rounding and than the least, N."""
     lam = [np.abs(np.nan_to_num(trace.run.lam)).max(axis=0, initial=0.0) for trace in traces]
     largest = np.max(lam, axis=0, initial=0.0)
+    noise = max(IDLE * float(np.max(largest, initial=0.0)), _noise(traces), least)
+    return [int(k) for k in np.flatnonzero(largest > noise)]
+
+
+def _noise(traces: Sequence[Trace]) -> float:
+    """A force of rounding, of that which the energy makes over the way, N."""
     way = max(traces[0].about.get("scales", ()), default=0.0) or 1.0
-    usual = max(float(np.max(largest, initial=0.0)), energy_of(traces[0].run) / way)
-    return [int(k) for k in np.flatnonzero(largest > IDLE * usual)]
+    return IDLE * energy_of(traces[0].run) / way
 
 
 def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, dict[str, float]]:
@@ -164,7 +252,7 @@ def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None,
     low, high = ends.get(TRUTH, (0.0, 0.0))
     reach = max(high, -low)
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
-    if not far or reach == 0.0:
+    if not far or reach <= _noise(traces):
         return None, {}
     return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), far
 
@@ -190,11 +278,13 @@ def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
     return sheet.done()
 
 
-def penetration(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
-    """Depth of every contact below its surface; |gap| of a row that is always on."""
+def penetration(
+    traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, which: Sequence[int] = ()
+) -> Figure:
+    """Depth of contacts below their surfaces; |gap| of rows that are always on."""
     contacts = traces[0].about["contacts"]
-    shown = drawn(len(contacts))
-    always = [bool((traces[0].run.mode[:, k] == Mode.BILATERAL).all()) for k in shown]
+    shown = which or sorted(deepest(traces)[:MOST_SIGNALS])
+    always = _always(traces)[shown]
     turn = traces[0].about.get("turning", ())
     rows = [
         f"{'|gap|' if on else 'depth'} {contacts[k]}\n[{'rad' if contacts[k] in turn else 'm'}]"
@@ -203,8 +293,7 @@ def penetration(traces: Sequence[Trace], points: int = POINTS, limits: Limits = 
     sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points, group=len(rows))
     for row, (k, on) in enumerate(zip(shown, always, strict=True)):
         for i, trace in enumerate(traces):
-            gap = trace.run.gap[:, k]
-            depth = np.abs(gap) if on else -gap
+            depth = _depth(trace.run.gap[:, k], on)
             sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, np.nan))
     sheet.logarithmic(*(row for row, on in enumerate(always) if on))
     return sheet.done()
@@ -216,7 +305,8 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     floor, usual = floor_of(traces[0].run.t), list[Floats]()
     for i, trace in enumerate(traces):
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
-        sheet.line(trace, i, 0, np.maximum(lengths, floor), starts, shape="hv")
+        ends = starts[-1:] + lengths[-1:]  # the last step is drawn to its end too
+        sheet.line(trace, i, 0, np.maximum(np.r_[lengths, lengths[-1:]], floor), np.r_[starts, ends], shape="hv")
         usual += [np.quantile(lengths, (REMAINDERS, 1.0))] if len(lengths) else []
     sheet.logarithmic(0)
     if usual:
@@ -226,27 +316,66 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
 
 def suits(name: str, traces: Sequence[Trace]) -> bool:
     """Whether a figure has anything to show."""
-    if name == "modes":
-        return bool(changing(traces)[0])
-    return name not in ("force", "penetration") or bool(
-        carrying(traces) if name == "force" else traces[0].about["contacts"]
-    )
+    return name not in SIGNALS or bool(SIGNALS[name][1](traces))
+
+
+def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> list[Plot]:
+    """One figure if there is anything in it; of many signals those that matter most, the others drawn folded."""
+    _, draw = FIGURES[name]
+    if name not in SIGNALS:
+        figure = draw(traces, points, limits)
+        return [Plot(name=f"plot-{name}", figure=figure, time=True)] if figure["data"] else []
+    noun, ranked, more = SIGNALS[name]
+    order = ranked(traces)[:MOST_SIGNALS]
+    cut = FIRST if len(order) > FIRST + 1 else len(order)
+    first, rest = sorted(order[:cut]), sorted(order[cut:])
+    found = [Plot(name=f"plot-{name}", figure=draw(traces, points, limits, first), time=True)]
+    if rest:
+        told = f"{len(rest)} more {noun} {more}: {', '.join(_names(traces, noun)[k] for k in rest)}"
+        figure = draw(traces, points, limits, rest)
+        found.append(Plot(name=f"plot-{name}-more", figure=figure, time=True, folded=told))
+    return found
+
+
+def _names(traces: Sequence[Trace], noun: str) -> list[str]:
+    """Names of coordinates or contacts."""
+    return [one if isinstance(one, str) else one["name"] for one in traces[0].about[noun]]
 
 
 def note(name: str, traces: Sequence[Trace]) -> str:
     """What the reader of a figure must know."""
-    listed = {"motion": "coordinates", "force": "contacts", "penetration": "contacts", "modes": "contacts"}.get(name)
-    count = len(traces[0].about[listed]) if listed else 0
-    if name == "force":
-        bearing = carrying(traces)
-        idle = [f"{one}" for k, one in enumerate(traces[0].about["contacts"]) if k not in bearing]
-        count = len(bearing)
-    else:
-        idle = []
-    some = f"{MOST_SIGNALS} of {count} {listed} are drawn; all are stored." if count > MOST_SIGNALS else ""
-    more = f" and {len(idle) - NAMED} more" if len(idle) > NAMED else ""
-    some += f" Without a force in every run: {', '.join(idle[:NAMED])}{more}." if idle else ""
-    return f"{NOTES.get(name, '')} {some}".strip()
+    told = [NOTES.get(name, "")]
+    if name in SIGNALS:
+        noun, order, _ = SIGNALS[name]
+        names, found = _names(traces, noun), order(traces)
+        if len(found) > MOST_SIGNALS:
+            told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
+        if name in IDLE_NOTES and (rest := [names[k] for k in range(len(names)) if k not in found]):
+            told.append(f"{IDLE_NOTES[name]}: {few(rest)}.")
+    if name == "modes":
+        told += [*_same(traces), *_throughout(traces)]
+    return " ".join(filter(None, told))
+
+
+def few(names: Sequence[str]) -> str:
+    """Some names, and how many more there are."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
+
+
+def _same(traces: Sequence[Trace]) -> Iterator[str]:
+    names = traces[0].about["contacts"]
+    groups = [f"{', '.join(names[k] for k in rest)} as {names[first]}" for first, *rest in alike(traces) if rest]
+    if groups:
+        yield f"Alike: {'; '.join(groups[:NAMED])}{f'; and {len(groups) - NAMED} more' * (len(groups) > NAMED)}."
+
+
+def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
+    found: dict[str, list[str]] = {}
+    for contact, mode in changing(traces)[1]:
+        found.setdefault(mode, []).append(contact)
+    for mode, names in found.items():
+        yield f"{mode} throughout, in every engine: {few(names)}."
 
 
 NOTES = {
@@ -260,7 +389,8 @@ NOTES = {
         "judge by the impulse. Instantaneous collisions are steps of the impulse."
     ),
 }
-FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int, Limits], Figure]]] = {
+IDLE_NOTES = {"force": "Without a force in every run", "penetration": "Never below the surface"}
+FIGURES: dict[str, tuple[str, Callable[..., Figure]]] = {
     "motion": ("Motion", motion),
     "force": ("Contact force", force),
     "energy": ("Energy", energy),
@@ -268,3 +398,10 @@ FIGURES: dict[str, tuple[str, Callable[[Sequence[Trace], int, Limits], Figure]]]
     "penetration": ("Penetration", penetration),
     "steps": ("Step size", steps),
 }
+SIGNALS: dict[str, tuple[str, Callable[[Sequence[Trace]], list[int]], str]] = {
+    "motion": ("coordinates", farthest, "with smaller errors"),
+    "force": ("contacts", loaded, "with less impulse"),
+    "modes": ("contacts", switching, "with less impulse"),
+    "penetration": ("contacts", deepest, "less deep"),
+}
+"""Of what a figure draws one signal each, which those are, those that matter most first, and what the others are."""

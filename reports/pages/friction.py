@@ -106,7 +106,7 @@ def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     if contact.first.type == "plane":
         slips = [_line(trace, i, _slipping(trace, contact, place), most) for i, trace in enumerate(traces)]
         plots.append(_plot("slip", f"Slip, {name}", slips, ("slip t1 [m/s]", "slip t2 [m/s]"), [], square=True))
-    return [Section(name="friction", title="Friction", text=TEXT, plots=plots)]
+    return [Section(name="friction", title="Friction", text=TEXT, plots=plots, context={"beside": True})]
 
 
 def _pressed(traces: Sequence[Trace]) -> tuple[Contact, int] | None:

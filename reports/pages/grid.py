@@ -9,13 +9,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import runs_of, share
+from crossbody.reports.judging.told import beyond, runs_of, share
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
 from crossbody.reports.pages.html import number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
+RANKED = (*WORST[:-1], Word.INFO.value, Word.WITHIN.value)
+"""Words of runs, the worst first: one that is not judged is beyond some limit for a known cause."""
 SHARES = tuple(part_of("position", part) for part in PARTS)
 """Parts of the worst error of position: they stand in the table of a case although nothing judges them."""
 KEY = (
@@ -84,21 +86,28 @@ def names(rows: Iterable[Row]) -> list[str]:
 
 
 def worst(rows: Sequence[Row]) -> tuple[str, str]:
-    """The worst word of some rows, and how many of how many judged have it."""
+    """The worst word of some rows, and how many of how many judged have it.
+
+    What is within its limits beside numbers beyond theirs that are not judged, is not judged itself.
+    """
     counts = Counter(row["verdict"] for row in rows)
     total = sum(counts[word] for word in WORST)
     word = next((word for word in WORST if counts[word]), Word.SKIPPED.value if counts["skipped"] else Word.INFO.value)
     if not total:
         return word, ""
-    return word, str(total) if word == Word.WITHIN.value else f"{counts[word]} of {total}"
+    if word != Word.WITHIN.value:
+        return word, f"{counts[word]} of {total}"
+    loose = sum(map(beyond, rows))
+    return (Word.INFO.value, f"{loose} beyond") if loose else (word, str(total))
 
 
 def verdict(rows: Sequence[Row]) -> str:
     """The worst word of all runs and how many have it; nothing where nothing was run."""
-    words = Counter(worst(run.rows)[0] for run in runs_of(rows))
-    found = next((word for word in WORST if words[word]), "")
+    told = [worst(run.rows) for run in runs_of(rows)]
+    words = Counter(word for word, text in told if text)
+    found = next((word for word in RANKED if words[word]), "")
     if not found:
-        return "not judged" if words[Word.INFO] else ""
+        return Word.INFO.value if any(word == Word.INFO for word, _ in told) else ""
     return "all within" if found == Word.WITHIN else f"{words[found]} {found}"
 
 

@@ -237,7 +237,8 @@ def plot(figure: Figure | Written) -> dict[str, Any]:
         axis["title"]["text"] = UNITLESS.sub("", axis["title"]["text"])
     layout["margin"] = {"l": 84, "r": 14, "t": 34, "b": 50}
     value = {"data": made["data"], "layout": layout}
-    return {"title": made["layout"]["title"]["text"], "height": layout["height"], "value": value}
+    title, _, more = made["layout"]["title"]["text"].partition(". ")
+    return {"title": title, "more": more, "height": layout["height"], "value": value}
 
 
 def slug(text: str) -> str:

@@ -168,14 +168,11 @@ def _tiles(found: Results) -> dict[str, Any]:
     """Counts of all verdicts, and sentences of warning."""
     counts = Counter(row["verdict"] for row in found.verdicts)
     words = {word: counts[word] for word in (*reversed(grid.WORST), Word.SKIPPED.value)}
+    profiles = len({row["who"] for row in found.verdicts if row["engine"] != TRUTH})
     failed = sum(row["metric"] == "audit" and row["verdict"] == Word.OUTSIDE for row in found.verdicts)
+    named = ((len(found.cases), "case"), (profiles, "engine profile"))
     tiles = [
-        {"value": len(found.cases), "title": "cases", "word": ""},
-        {
-            "value": len({row["who"] for row in found.verdicts if row["engine"] != TRUTH}),
-            "title": "engine profiles",
-            "word": "",
-        },
+        *({"value": n, "title": name if n == 1 else f"{name}s", "word": ""} for n, name in named),
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if failed:

@@ -14,6 +14,8 @@ from crossbody.cases import InvalidValue
 from crossbody.cases.arrays import Floats
 from crossbody.reports import scenes
 from crossbody.reports.figures.styles import style
+from crossbody.reports.measuring.scale import idle
+from crossbody.reports.pages.figures import carrying
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace
 
@@ -48,7 +50,10 @@ class Film:
         self.stage = self.scene.stage(self.parameters)
         self.t, self.q = filled(trace.run, trace.quaternions)
         self.color = style(trace, i)["color"]
-        self.force = float(np.max(np.abs(np.nan_to_num(trace.run.lam)), initial=0.0))
+        self.lam = np.zeros_like(trace.run.lam)
+        bearing = carrying([trace], idle(trace.run))
+        self.lam[:, bearing] = np.nan_to_num(trace.run.lam[:, bearing])
+        self.force = float(np.max(np.abs(self.lam), initial=0.0))
         some = np.unique(np.linspace(0, len(self.q) - 1, 40).astype(int))
         poses = self.scene.poses(self.q[some], self.parameters)
         spans = [np.concatenate([*_points(self.stage, pose)]) for pose in poses]
@@ -66,8 +71,7 @@ class Film:
         if self.far:
             self.to = _camera(self.stage, [*_points(self.stage, pose)])
         row = max(int(np.searchsorted(self.run.t, t, side="right")) - 1, 0)  # what has been, as in the playback
-        lam = np.nan_to_num(self.run.lam[row : row + 1])
-        pushes = self.scene.arrows(q[None], lam, self.parameters)[0]
+        pushes = self.scene.arrows(q[None], self.lam[row : row + 1], self.parameters)[0]
         return [*self._still(), *self._bodies(pose), *self._arrows(pushes)]
 
     def _still(self) -> Iterator[Stroke]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from crossbody.reports.figures.section import Figure, Plot, Section
 from crossbody.reports.figures.styles import COLOURS, plain
+from crossbody.reports.judging.verdict import Row
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
 
@@ -29,7 +30,9 @@ LADDERS = (
 )
 
 
-def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: Mapping[str, float]) -> list[Section]:
+def precision(
+    out: Path, label: str, rows: Sequence[Row], walls: Mapping[str, float], places: Mapping[str, int]
+) -> list[Section]:
     """The section, if there is anything to show: a benchmark in the folder, or verdicts and run times, s."""
     if ladders := _ladders(out, label):
         import pandas as pd
@@ -41,7 +44,7 @@ def precision(out: Path, label: str, rows: Sequence[Mapping[str, Any]], walls: M
         (row["who"], float(row["value"]), 1e3 * walls[row["who"]]) for row in rows
         if row["metric"] == "position" and row["value"] is not None and walls.get(row["who"])
     ]  # fmt: skip
-    return [_section(scatter(points), RUNS)] if points else []
+    return [_section(scatter(points, places), RUNS)] if points else []
 
 
 def overview(found: Results) -> list[Section]:
@@ -55,11 +58,11 @@ def overview(found: Results) -> list[Section]:
     if not points:
         return []
     if len(found.rows) == 1:
-        return [_section(scatter([(who, error, ms) for who, ((_, error, ms),) in points.items()]), RUNS)]
-    return [_section(cloud(points), ALL)]
+        return [_section(scatter([(who, error, ms) for who, ((_, error, ms),) in points.items()], found.places), RUNS)]
+    return [_section(cloud(points, found.places), ALL)]
 
 
-def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
+def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapping[str, int]) -> Figure:
     """One mark a case, a colour and a symbol an engine: error of position (relative), run time in ms."""
     data = [
         {
@@ -67,10 +70,9 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
             "y": [ms for *_, ms in mine], "name": plain(who), "meta": who,
             "text": [plain(label) for label, *_ in mine],
             "hovertemplate": "%{text}<br>error %{x:.2g}, %{y:.3g} ms<extra>" + plain(who) + "</extra>",
-            "marker": {"size": 9, "color": COLOURS[i % len(COLOURS)], "symbol": SYMBOLS[i % len(SYMBOLS)],
-                       "opacity": 0.8},
+            "marker": _mark(places[who]) | {"size": 9, "opacity": 0.8},
         }
-        for i, (who, mine) in enumerate(points.items(), start=1)
+        for who, mine in sorted(points.items(), key=lambda one: places[one[0]])
     ]  # fmt: skip
     every = [one for mine in points.values() for one in mine]
     layout = {
@@ -93,7 +95,11 @@ def _ladders(out: Path, label: str) -> list[dict[str, Any]]:
     return [row for row in read_json(out / "bench.json")["rows"] if row["case"] == label]
 
 
-def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
+def _mark(place: int) -> dict[str, str]:
+    return {"color": COLOURS[place % len(COLOURS)], "symbol": SYMBOLS[place % len(SYMBOLS)]}
+
+
+def scatter(points: Sequence[tuple[str, float, float]], places: Mapping[str, int]) -> Figure:
     """One mark an engine: error of position (relative), run time in ms."""
     finite = [error for _, error, _ in points if math.isfinite(error)]
     edge = 10.0 * max([*finite, FLOOR])
@@ -105,10 +111,9 @@ def scatter(points: Sequence[tuple[str, float, float]]) -> Figure:
             # names stand inside the plot
             "textposition": "middle left" if not math.isfinite(error) or error > 1e-4 * edge else "middle right",
             "textfont": {"size": 11}, "cliponaxis": False,
-            "marker": {"size": 10, "color": COLOURS[i % len(COLOURS)],
-                       "symbol": SYMBOLS[i % len(SYMBOLS)] if math.isfinite(error) else "x"},
+            "marker": _mark(places[who]) | {"size": 10} | ({} if math.isfinite(error) else {"symbol": "x"}),
         }
-        for i, (who, error, ms) in enumerate(points, start=1)
+        for who, error, ms in points
     ]  # fmt: skip
     layout = {
         "title": {"text": "Run time against error of position"}, "height": 420, "showlegend": False,

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pyarrow import ArrowException
 
 from crossbody.cases import InvalidValue, OutputError
+from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import COLUMNS, Row, Word, by
+from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.pages.grid import names
 from crossbody.reports.runs import beside
 from crossbody.reports.runs.files import file_name, listed
 from crossbody.reports.runs.output import is_staged, recover
@@ -34,6 +37,7 @@ class CaseFiles:
         about: what is known of it; of the truth, where there is one.
         paths: files of its motions, truth first.
         missing: sentences on motions that should be there and cannot be read.
+        places: of the engines of all cases, from 1 on: they decide how an engine looks.
     """
 
     label: str
@@ -41,10 +45,15 @@ class CaseFiles:
     about: Mapping[str, Any]
     paths: tuple[Path, ...]
     missing: tuple[str, ...]
+    places: Mapping[str, int]
 
     def traces(self) -> list[Trace]:
         """The motions themselves."""
-        return [load(path) for path in self.paths]
+        return [self._placed(load(path)) for path in self.paths]
+
+    def _placed(self, trace: Trace) -> Trace:
+        place = self.places.get(label(trace))
+        return trace if place is None else replace(trace, about={**trace.about, "place": place})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +67,7 @@ class Results:
         told: provenance.
         cases: in the order of their verdicts.
         walls: (case:variant, engine:profile) -> run time, s.
+        places: of the engines, from 1 on: they decide how an engine looks.
     """
 
     out: Path
@@ -67,6 +77,7 @@ class Results:
     told: Mapping[str, Any]
     cases: tuple[CaseFiles, ...]
     walls: Mapping[tuple[str, str], float]
+    places: Mapping[str, int]
     base: Sequence[Row] | None = None
     base_name: str = ""
 
@@ -90,7 +101,7 @@ def read(out: Path, against: Path | None = None) -> Results:
     base = None if against is None else verdicts_of(against)
     return Results(
         out=out, verdicts=verdicts, rows=by(verdicts, "label"), audits=audits, told=told,
-        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, base=base,
+        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, places=places_of(verdicts), base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
 
@@ -105,12 +116,20 @@ def verdicts_of(out: Path) -> list[Row]:
         versions = table.get("provenance", {}).get("versions", {})
         by = versions.get("crossbody", "another version") if isinstance(versions, dict) else "another version"
         raise OutputError(
-            f"{out} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; run the cases again."
+            f"{out / 'verdicts.json'} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; "
+            "run the cases again."
         )
     check_fields(out / "verdicts.json", rows, JUDGED)
     return [
         row | {"label": f"{row['case']}:{row['variant']}", "who": f"{row['engine']}:{row['profile']}"} for row in rows
     ]
+
+
+def places_of(verdicts: Sequence[Row]) -> dict[str, int]:
+    """Engines that ran on some case, in the order of their rows, profiles of one engine side by side."""
+    ran = {row["who"] for row in verdicts if row["verdict"] != Word.SKIPPED}
+    found = [who for who in names(row for row in verdicts if row["engine"] != TRUTH) if who in ran]
+    return {who: i for i, who in enumerate(found, start=1)}
 
 
 def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], Times]:
@@ -132,6 +151,7 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
         paths.setdefault(label, []).append(path)
         abouts.setdefault(label, about)
         times[label, who] = told["wall_s"], about.get("took_s")
+    places = places_of(verdicts)
     labels = dict.fromkeys([*(row["label"] for row in verdicts), *paths])
     ran = by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
     wanted = {label: list(dict.fromkeys(row["who"] for row in rows)) for label, rows in ran.items()}
@@ -139,7 +159,7 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
         CaseFiles(
             label=label, page=f"case-{file_name(label)}", about=abouts.get(label, {}),
             paths=tuple(paths.get(label, ())),
-            missing=_missing(label, wanted.get(label, []), times, broken),
+            missing=_missing(label, wanted.get(label, []), times, broken), places=places,
         ) for label in labels
     )  # fmt: skip
     return found, times

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,8 @@ MODE_COLOURS = {
     Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
     Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
 }  # fmt: skip
+LINE = 20  # letters of a title in one line
 LONGEST = 150  # intervals of one mode in one bar; of more, the longest are drawn
-MOST_CONTACTS = 8
 
 
 class Sheet:
@@ -142,12 +143,21 @@ def _level(axis: str, value: float, name: str) -> dict[str, Any]:
     return {"type": "line", "layer": "below", "line": line, "label": label} | ends
 
 
+def _lines(name: str) -> str:
+    """The title of an axis and its unit: a long one in more lines, no longer than a plot is high."""
+    text, _, unit = plain(name).partition("\n")
+    if len(text) <= LINE:
+        return f"{text}<br>{unit}" if unit else text
+    whole = unit.replace(" ", "\u00a0")
+    return "<br>".join(wrap(f"{text} {whole}", LINE, break_on_hyphens=False))
+
+
 def _pair(n: str, name: str, domain: list[float], timed: bool) -> dict[str, Any]:
     """The two axes of one plot."""
     x: dict[str, Any] = {"anchor": f"y{n}", "domain": [0.0, 1.0], "showticklabels": timed}
     if n:
         x["matches"] = "x"
-    title = {"text": plain(name).replace("\n", "<br>"), "standoff": 14, "font": {"size": 12}}
+    title = {"text": _lines(name), "standoff": 14, "font": {"size": 12}}
     y = {"anchor": f"x{n}", "domain": domain, "title": title, "exponentformat": "e", "tickfont": {"size": 10.5}}
     return {f"xaxis{n}": x, f"yaxis{n}": y}
 
@@ -159,20 +169,19 @@ def _times(t: Floats) -> Floats:
     return t.astype(np.float32) if smallest > FINE * abs(t[-1]) else t
 
 
-def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None) -> Figure:
-    """One strip a contact and engine; contacts that are in one mode throughout are named instead."""
-    moving, still = changing(traces)
+def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None, which: Sequence[int] = ()) -> Figure:
+    """One strip a contact and engine, of contacts whose modes change."""
+    moving = [(k, contact) for k, contact in changing(traces)[0] if not which or k in which]
     bars: list[dict[str, Any]] = []
     shown: set[int] = set()
-    for k, contact in reversed(moving[:MOST_CONTACTS]):
+    for k, contact in reversed(moving):
         for trace in reversed(traces):
             for mode, spans in _by_mode(trace.run, k).items():
                 name = label(trace) if len(moving) == 1 else f"{contact}, {label(trace)}"
                 bars.append(_bar(trace, name, mode, spans[:LONGEST]) | {"showlegend": mode not in shown})
                 shown.add(mode)
-    named = f". Throughout, in every engine: {', '.join(still)}" if still else ""
     layout = {
-        "title": {"text": f"Modes of the state machine{named}"}, "barmode": "overlay", "bargap": 0.25,
+        "title": {"text": "Modes of the state machine"}, "barmode": "overlay", "bargap": 0.25,
         "height": 150 + 18 * len({bar["y"][0] for bar in bars}),
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
         "xaxis": {"title": {"text": "time [s]"}, "range": [0.0, float(traces[0].run.t[-1])]},
@@ -181,16 +190,24 @@ def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None)
     return {"data": bars, "layout": layout}
 
 
-def changing(traces: Sequence[Trace]) -> tuple[list[tuple[int, str]], list[str]]:
-    """Contacts (index, name) whose mode changes or differs among engines, and "name MODE" of the others."""
+def changing(traces: Sequence[Trace]) -> tuple[list[tuple[int, str]], list[tuple[str, str]]]:
+    """Contacts (index, name) whose mode changes or differs among engines, and name and mode of the others."""
     moving, still = [], []
     for k, contact in enumerate(traces[0].about["contacts"]):
         seen = {int(m) for trace in traces for m in np.unique(trace.run.mode[:, k]) if m >= 0}
         if len(seen) > 1:
             moving.append((k, contact))
         else:
-            still += [f"{contact} {Mode(m).name}" for m in seen]
+            still += [(contact, Mode(m).name) for m in seen]
     return moving, still
+
+
+def alike(traces: Sequence[Trace]) -> list[list[int]]:
+    """Contacts whose mode changes or differs, those together that are in the same modes in every engine."""
+    found: dict[tuple[bytes, ...], list[int]] = {}
+    for k, _ in changing(traces)[0]:
+        found.setdefault(tuple(trace.run.mode[:, k].tobytes() for trace in traces), []).append(k)
+    return list(found.values())
 
 
 def _bar(trace: Trace, name: str, mode: Mode, spans: Sequence[tuple[float, float]]) -> dict[str, Any]:

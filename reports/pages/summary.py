@@ -62,7 +62,8 @@ def _cells(found: Results) -> dict[str, dict[str, Sequence[Row]]]:
 
 
 def _row(found: Results, who: str, mine: Mapping[str, Sequence[Row]]) -> dict[str, Any]:
-    words = Counter(grid.worst(rows)[0] for rows in mine.values())
+    told = [grid.worst(rows) for rows in mine.values()]
+    words = Counter(word for word, text in told if text or word != Word.INFO)
     errors = [
         float(row["value"]) for rows in mine.values() for row in rows
         if row["metric"] == "position" and row["value"] is not None and math.isfinite(row["value"])
@@ -70,8 +71,9 @@ def _row(found: Results, who: str, mine: Mapping[str, Sequence[Row]]) -> dict[st
     costs = [cost for label in mine if (cost := _cost(found.walls, label, who))]
     return {
         "who": who.removesuffix(":"),
-        "worst": next((word for word in (*grid.WORST, Word.SKIPPED.value) if words[word]), Word.INFO.value),
-        "within": words["within"], "expected": words["expected-outside"], "outside": words["outside"],
+        "worst": next((word for word in (*grid.RANKED, Word.SKIPPED.value) if words[word]), Word.INFO.value),
+        "within": words["within"], "expected": words["expected-outside"] + words["not judged"],
+        "outside": words["outside"],
         "skipped": words["skipped"], "error": median(errors) if errors else math.nan,
         "most": max(errors, default=math.nan), "cost": median(costs) if costs else math.nan,
     }  # fmt: skip

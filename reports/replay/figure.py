@@ -26,9 +26,9 @@ def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()
     channels = _channels(rows)
     data: list[dict[str, Any]] = []
     for place, (channel, _) in enumerate(channels, start=1):
-        for i, (who, line) in enumerate(rows[rows["channel"] == channel].groupby("who", sort=False)):
+        for i, (who, line) in enumerate(rows[rows["channel"] == channel].groupby("who", sort=False), start=1):
             t, seen, left = _broken(line)
-            if i == 0:
+            if i == 1:
                 data += [*_band(t, seen - left, noise.get(channel, np.nan), place), _line(t, seen, "measured", place)]
                 data[-1]["line"] = {"color": GREY, "width": 4}
             data.append(_line(t, seen - left, str(who), place, i))
@@ -41,7 +41,7 @@ def residual(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = 
     channels = _channels(rows)
     data, shapes = [], list(_shades(rows, held, len(channels)))
     for place, (channel, _) in enumerate(channels, start=1):
-        for i, (who, line) in enumerate(rows[rows["channel"] == channel].groupby("who", sort=False)):
+        for i, (who, line) in enumerate(rows[rows["channel"] == channel].groupby("who", sort=False), start=1):
             t, _, left = _broken(line)
             data.append(_line(t, left, str(who), place, i))
         half = SIGMAS * noise.get(channel, np.nan)
@@ -57,7 +57,7 @@ def correlation(rows: pd.DataFrame) -> Figure:
     data, shapes = [], []
     for place, (channel, given) in enumerate(kinds, start=1):
         chosen = rows[(rows["channel"] == channel) & (rows["input"] == given)]
-        for i, (who, line) in enumerate(chosen.groupby("who", sort=False)):
+        for i, (who, line) in enumerate(chosen.groupby("who", sort=False), start=1):
             lag, value = line["lag"].to_numpy(float), line["value"].to_numpy(float)
             data.append(_line(lag, value, str(who), place, i) | {"mode": "lines+markers", "marker": {"size": 4}})
         band = float(chosen["band"].iloc[0])
@@ -124,7 +124,7 @@ def _broken(line: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
 
 def _line(x: Floats, y: Floats, name: str, place: int, i: int = 0) -> dict[str, Any]:
     """One line; its name stands in the legend once."""
-    look = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)], "width": 1.5}
+    look = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[max(i - 1, 0) % len(DASHES)], "width": 1.5}
     axis = number(place)
     return {
         "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)),

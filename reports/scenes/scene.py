@@ -19,6 +19,7 @@ from crossbody.engines.nearest import Places, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
 
 Pose = tuple[Floats, Floats]  # origins (n, 3), m, and rotations (n, 3, 3) of one body
+WATER = 1000.0  # kg/m^3
 MOST = 500  # bodies that are drawn
 SHORT = 1e-5
 """Over so long a time velocities are taken from places, s: its square and rounding over it are both small."""
@@ -200,7 +201,9 @@ def _around(corners: Floats, side: Sequence[int], normal: Floats) -> tuple[int, 
 
 
 def _inertia_box(body: Body, index: int) -> dict[str, Any]:
-    """Return the box of equal density that has a body's mass and inertia."""
+    """Return the box of equal density that has a body's mass and inertia; of a mass point, a ball of water."""
+    if not any(body.inertia):
+        return _drawn(np.array([body.com]), index, (body.mass / (WATER * 4.0 / 3.0 * np.pi)) ** (1.0 / 3.0), ())
     xx, yy, zz, xy, xz, yz = body.inertia
     moments, axes = np.linalg.eigh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     sides = np.sqrt(np.maximum(1.5 * (moments.sum() - 2.0 * moments) / body.mass, 0.0))

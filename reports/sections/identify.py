@@ -19,11 +19,16 @@ ESTIMATES = columns(
     first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
 )  # fmt: skip
 HELD = columns(
-    error="Error", fitted_before=("Fitted windows, start", Kind.NUMBER),
+    error="Error", means="Meaning", unit="Unit", fitted_before=("Fitted windows, start", Kind.NUMBER),
     fitted_after=("estimate", Kind.NUMBER),
     held_before=("Held-out windows, start", Kind.NUMBER), held_after=("estimate", Kind.NUMBER),
     change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
+MEANS = {
+    "rmse": "root mean square of measured less predicted",
+    "end_median": "at the end of a window, median over windows",
+    "end_90": "at the end of a window, 90 % quantile over windows",
+}
 PROFILE = (
     "The profile is the increase of the cost (sum of squares) when one parameter is moved and "
     "all others are fitted again. If it is a symmetric parabola, the intervals from "
@@ -40,6 +45,7 @@ def sections(out: Path) -> tuple[Section, ...]:
 
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
     estimates["half"] = (estimates["high"] - estimates["low"]) / 2.0
+    held["means"], held["unit"] = held["error"].map(MEANS), _unit(out)
     told = read_json(out / "identify.json")["provenance"]["fit"]
     text = _told(estimates, held, told)
     estimates["identifiable"] = estimates["identifiable"].map({True: "yes", False: "no"})
@@ -61,6 +67,13 @@ def sections(out: Path) -> tuple[Section, ...]:
     if not plots:
         return (first,)
     return (first, Section(name="identify-plots", title="How well they are determined", text=PROFILE, plots=plots))
+
+
+def _unit(out: Path) -> str:
+    """Unit of what was measured; "mixed" where channels have several."""
+    rows = read_json(out / "replay.json")["rows"] if (out / "replay.json").is_file() else ()
+    units = {row["unit"] for row in rows if row["metric"] == "rmse"}
+    return units.pop() if len(units) == 1 else "mixed" if units else ""
 
 
 def _only(rows: pd.DataFrame, shown: Sequence[Column]) -> pd.DataFrame:

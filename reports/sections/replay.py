@@ -19,10 +19,28 @@ TEXT = (
     "deviations of the measurement noise; windows held out of an identification are shaded."
 )
 METRICS = columns(
-    who="Engine", metric="Metric", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
+    who="Engine", metric="Metric", means="Meaning", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
     expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER),
     verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
+MEANS = {
+    "fit": "share of the measured motion that is explained, 100 at best",
+    "rmse": "root mean square of measured less predicted",
+    "largest": "largest of measured less predicted",
+    "bias": "mean of measured less predicted",
+    "delay": "how much later the measurement is than the prediction",
+    "noise": "of the measurement, one standard deviation",
+    "unexplained": "rmse without the noise",
+    "autocorrelation": "lags of the residuals' own correlation inside the band of noise, 99 at best",
+    "crosscorrelation": "lags of the residuals' correlation with an input inside the band, 99 at best",
+    "error": "size of the error so long after the start of a window: median, or 90 % quantile",
+    "impacts": "impacts predicted less those measured",
+    "impact": "instants of impacts against the measured ones",
+    "impulse": "sum over all impacts: its error, or what was measured",
+    "windows": "windows whose prediction failed",
+    "speed": "time of the motion over the time that the computation took",
+}
+"""What metrics say, by the first words of their names."""
 FINDINGS = columns(
     what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Comment", Kind.LONG)
 )
@@ -39,6 +57,7 @@ def sections(out: Path) -> tuple[Section, ...]:
         for name in ("replay", "findings", "residuals", "correlations")
     )
     metrics = metrics.reindex(columns=[column.key for column in METRICS])  # an earlier run judged nothing
+    metrics["means"] = metrics["metric"].map(lambda name: MEANS.get(name.partition("_")[0], ""))
     metrics["unit"] = metrics["unit"].map(lambda unit: unit_text(unit, "{}"))
     told = read_json(out / "replay.json")["provenance"]
     about, held = told["log"], told.get("fit", {}).get("held", ())
@@ -49,8 +68,8 @@ def sections(out: Path) -> tuple[Section, ...]:
         for name, draw in (seen | {"replay-residual": figure.residual}).items():
             plots.append(Plot(name=name, figure=draw(left, noise, held), time=True))
     plots += [Plot(name="replay-correlation", figure=figure.correlation(correlated))] if len(correlated) else []
-    origin = "SYNTHETIC, no measurement." if about["synthetic"] else "A measurement."
-    text = f"{origin} {about['file']}{about['about'] and ': '}{about['about']}"
+    origin = "SYNTHETIC, no measurement" if about["synthetic"] else "a measurement"
+    text = f"The log {about['file']} is {origin}{about['about'] and ': '}{about['about']}."
     if not held:  # windows held out of a fit are judged with it
         text = f"{judged(metrics)} {text}"
     table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")

@@ -21,6 +21,7 @@ from crossbody.reports.commands import replay as command
 from crossbody.reports.replay.comparison import verdicts
 from crossbody.reports.runs import watch
 from crossbody.reports.sections.identify import sections
+from crossbody.reports.sections.replay import MEANS
 
 MODEL = ["--model", "double_pendulum", "--columns", "multiarm_double"]
 
@@ -49,7 +50,7 @@ def test_replay_writes_the_report_with_the_measurement_in_it(
     assert "measurement" in printed
     assert "error_2s_median" in printed
     page = (out / "index.html").read_text(encoding="utf-8")
-    assert "A measurement." in page
+    assert "is a measurement" in page
     assert "Measured less predicted" in page
     rows = json.loads((out / "verdicts.json").read_text(encoding="utf-8"))["rows"]
     assert {row["engine"] for row in rows} == {"reference", "mujoco"}
@@ -72,6 +73,7 @@ def test_replay_speaks_json(short: Path, tmp_path: Path, capsys: pytest.CaptureF
     rows = json.loads(capsys.readouterr().out)["metrics"]
     assert {row["metric"] for row in rows} >= {"fit", "rmse", "largest", "bias", "delay", "autocorrelation_inside"}
     assert all(row["who"] == "reference:compiled" for row in rows)
+    assert all(MEANS[row["metric"].partition("_")[0]] for row in rows), "the page says what each of them means"
 
 
 @needs_pendulum

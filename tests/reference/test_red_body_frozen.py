@@ -200,6 +200,7 @@ def test_the_report_draws_the_step_size() -> None:
     (line,) = figure["data"]
     starts, lengths = (np.frombuffer(base64.b64decode(line[axis]["bdata"]), line[axis]["dtype"]) for axis in "xy")
     assert title == "Step size"
-    np.testing.assert_allclose(starts, np.unique(found.t)[:-1], rtol=1e-7)
-    np.testing.assert_allclose(lengths, np.diff(np.unique(found.t)), rtol=1e-7)
+    np.testing.assert_allclose(starts, np.unique(found.t), rtol=1e-7)  # the last step to its end
+    np.testing.assert_allclose(lengths[:-1], np.diff(np.unique(found.t)), rtol=1e-7)
+    assert lengths[-1] == lengths[-2]
     assert figure["layout"]["yaxis"]["type"] == "log"

@@ -81,10 +81,13 @@ class Tags(HTMLParser):
         self.found.append((tag, dict(attrs)))
 
 
-def plots(out: Path) -> dict[str, dict]:
-    text = (out / CASE).read_text()
-    found = re.findall(r'<script type="text/plain" data-plot="([^"]+)">(.*?)</script>', text, re.DOTALL)
+def all_plots(page: Path) -> dict[str, dict]:
+    found = re.findall(r'<script type="text/plain" data-plot="([^"]+)">(.*?)</script>', page.read_text(), re.DOTALL)
     return {name.partition("--plot-")[2]: value_of(content) for name, content in found}
+
+
+def plots(out: Path) -> dict[str, dict]:
+    return all_plots(out / CASE)
 
 
 def test_every_figure_is_there_and_has_data(out: Path) -> None:
@@ -111,6 +114,28 @@ def test_engines_that_did_not_run_have_no_column_on_the_page_of_the_case(out: Pa
     assert f"fake:{HOSTILE}" in named(CASE)
     assert "absent:*" not in named(CASE)
     assert "absent:*" in named("index.html")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_engine_has_one_colour_on_all_pages(seed: int, result: CaseResult, tmp_path: Path) -> None:
+    """Cases have some engines each, and some of these have no run time, so no mark in the plot of run times."""
+    rng = np.random.default_rng(seed)
+    names = [f"p{k}" for k in range(6)]
+    run = replace(result.truth.trajectory, q=result.truth.trajectory.q + 1e-9)
+    results = [
+        replace(result, case=replace(result.case, name=f"case{k}"), entries=tuple(
+            Entry(engine="fake", profile=name, run=replace(run, wall_s=rng.choice([0.0, 1.0])))
+            for name in rng.permutation(names)[:3]
+        )) for k in range(4)
+    ]  # fmt: skip
+    seen: dict[str, set[str]] = {}
+    for page in made(tmp_path / "out", results).glob("*.html"):
+        for figure in all_plots(page).values():
+            for line in (line for line in figure["data"] if "meta" in line and line["type"] == "scatter"):
+                seen.setdefault(line["meta"], set()).add(line.get("line", line.get("marker"))["color"])
+    assert set(seen) == {"truth", *(f"fake:{entry.profile}" for one in results for entry in one.entries)}
+    assert all(len(colours) == 1 for colours in seen.values())
+    assert len(set.union(*seen.values())) == len(seen)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -19,12 +19,15 @@ from crossbody.cases import from_scene, load
 from crossbody.cases.scene import Body, Joint, Scene, Shape
 from crossbody.engines import load as load_engine
 from crossbody.reports import sections
+from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.pages import site
+from crossbody.reports.pages import figures, html, site
+from crossbody.reports.pages.html import Page
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
+from crossbody.reports.runs.store import Trace
 
 pytestmark = [
     pytest.mark.browser,
@@ -75,6 +78,7 @@ DRAWN = "[...document.querySelectorAll('.plot')].filter((box) => 'drawn' in box.
 
 
 def draw_all(browser: chromium.Browser) -> None:
+    browser.js("document.querySelectorAll('.fold').forEach((each) => { each.open = true; })")
     browser.js("document.querySelectorAll('.plot').forEach((box) => box.scrollIntoView())")
     browser.wait(
         "[...document.querySelectorAll('.plot')].every((box) => { if (!('drawn' in box.dataset)) box.scrollIntoView();"
@@ -129,6 +133,34 @@ def test_playback_moves_and_shares_its_clock(out: Path, browser: chromium.Browse
     )
     browser.js(NEXT_FRAME)
     assert browser.picture(".player canvas") != side
+    assert browser.complaints() == []
+
+
+SIXTY = """(async () => {
+    const began = performance.now();
+    for (let k = 0; k < 60; k += 1) await new Promise(requestAnimationFrame);
+    return performance.now() - began;
+})()"""
+"""How long sixty frames take, ms."""
+
+
+def layouts(browser: chromium.Browser) -> int:
+    """How often the page has been laid out."""
+    told = browser.call("Performance.getMetrics")["metrics"]
+    return next(one["value"] for one in told if one["name"] == "LayoutCount")
+
+
+def test_a_picture_that_moves_leaves_the_page_as_it_is(out: Path, browser: chromium.Browser) -> None:
+    """Each layout of a page takes time from the picture; the readout alone needs one, ten times a second."""
+    browser.open(out / CASE)
+    draw_all(browser)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    browser.call("Performance.enable")
+    browser.js("document.querySelector('[data-play]').click()")
+    browser.js(NEXT_FRAME)
+    before = layouts(browser)
+    took = browser.js(SIXTY)
+    assert layouts(browser) - before <= took / 100.0 + 2.0
     assert browser.complaints() == []
 
 
@@ -210,6 +242,18 @@ def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium
         at_edge, drawn = browser.js(edge)
         assert at_edge == 1
         assert drawn > 10
+
+
+@pytest.mark.parametrize(("t_end", "far"), [(0.1, False), (2.0, True)])
+def test_a_body_that_goes_far_is_followed(tmp_path: Path, browser: chromium.Browser, t_end: float, far: bool) -> None:
+    """It would be a few pixels of the way that it falls."""
+    body = Body(name="ball", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+    ball = Shape(name="ball", body="ball", type="sphere", size=(0.1, 0.0, 0.0))
+    scene = Scene(bodies=(body,), joints=(Joint(name="free", body="ball", type="free"),), shapes=(ball,))
+    case = from_scene(scene, q0=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], t_end=t_end)
+    browser.open(page_of(case, tmp_path / "out", load_engine("reference").prepare(case, "compiled")))
+    browser.wait("document.querySelector('[data-speed]').options.length > 0")
+    assert browser.js("document.querySelector('[data-follow]').checked") is far
 
 
 FRAMES = """new Promise((done) => {
@@ -338,10 +382,13 @@ def test_every_page_is_quiet_fits_and_has_no_violation(whole: Path, browser: chr
 CROSSED = """[...document.querySelectorAll('.plot')].flatMap((plot) => {
     const boxes = (kind) => [...plot.querySelectorAll(kind)].map((each) => each.getBoundingClientRect());
     const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
-    const ticks = boxes('.xtick text');
-    return boxes('[class*="g-x"] text').some((title) => ticks.some((tick) => meet(title, tick))) ? [plot.id] : [];
+    const titles = boxes('[class*="g-y"] text');
+    if (titles.some((one, i) => titles.slice(0, i).some((two) => meet(one, two)))) return [plot.id];
+    const over = (axis) => boxes(`[class*="g-${axis}"] text`).some(
+        (title) => boxes(`.${axis}tick text`).some((tick) => meet(title, tick)));
+    return ['x', 'y'].some(over) ? [plot.id] : [];
 })"""
-"""Plots where the title of an axis lies over the labels of its ticks."""
+"""Plots where the title of an axis lies over another one or over the labels of its ticks."""
 
 
 def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[str]:
@@ -351,7 +398,7 @@ def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[
     found = browser.complaints()
     if not browser.js("document.documentElement.scrollWidth <= innerWidth"):
         found.append("wider than the window")
-    found += [f"{name}: title over ticks" for name in browser.js(CROSSED)]
+    found += [f"{name}: titles over ticks" for name in browser.js(CROSSED)]
     if AXE is None or AXE.origin is None or width != 1400:
         return found
     browser.js(f"{Path(AXE.origin).with_name('axe.min.js').read_text(encoding='utf-8')}; 0")
@@ -418,3 +465,52 @@ def test_engines_are_laid_over_each_other_and_side_by_side_in_space(solids: Path
     draw_all(browser)
     assert browser.js('document.querySelectorAll(\'[data-attr="sendChartToCloud"], [data-title*="loud"]\').length') == 0
     assert browser.complaints() == []
+
+
+def test_what_is_folded_is_drawn_when_it_is_asked_for(solids: Path, browser: chromium.Browser) -> None:
+    """It takes part in the shared clock and in print from then on."""
+    browser.open(solids)
+    fold = "document.querySelector('.fold')"
+    browser.js(f"{fold}.scrollIntoView()")
+    browser.wait(DRAWN)
+    assert browser.js("[...document.querySelectorAll('.fold .plot')].some((box) => 'drawn' in box.dataset)") is False
+    browser.js(f"{fold}.querySelector('summary').click()")
+    browser.wait(f"'drawn' in {fold}.querySelector('.plot').dataset")
+    browser.js(f"{fold}.querySelector('.plot').scrollIntoView()")
+    browser.js(NEXT_FRAME)
+    browser.js(
+        "(() => { const clock = document.querySelector('[data-clock]'); clock.value = 500;"
+        " clock.dispatchEvent(new Event('input')); })()"
+    )
+    browser.wait(f"getComputedStyle({fold}.querySelector('.cursor')).visibility === 'visible'")
+    browser.js("dispatchEvent(new Event('beforeprint'))")
+    assert browser.js("[...document.querySelectorAll('.fold')].every((each) => each.open)")
+    browser.wait("[...document.querySelectorAll('.plot')].every((box) => 'drawn' in box.dataset)")
+    browser.js("dispatchEvent(new Event('afterprint'))")
+    assert browser.js("[...document.querySelectorAll('.fold')].filter((each) => each.open).length") == 1
+    assert browser.complaints() == []
+
+
+def test_long_names_lie_over_nothing(tmp_path: Path, browser: chromium.Browser) -> None:
+    solid = {"mass": 1.0, "com": (0.0, 0.0, -0.3), "inertia": (0.1, 0.1, 0.01, 0.0, 0.0, 0.0)}
+    names = [f"{side}_spring_link_joint_of_the_gripper" for side in ("left", "right", "middle")]
+    bodies = tuple(Body(name=name, **solid) for name in names)
+    joints = tuple(Joint(name=n, body=n, type="hinge", axis=(0.0, 1.0, 0.0), range=(-0.2, 3.0)) for n in names)
+    case = from_scene(Scene(bodies=bodies, joints=joints), q0=[0.5, 0.6, 0.7], t_end=0.5)
+    page = page_of(case, tmp_path / "out", load_engine("reference").prepare(case, "compiled"))
+    assert {width: found for width in (1400, 400) if (found := look(browser, page, width, "light"))} == {}
+
+
+def test_long_numbers_lie_over_nothing(tmp_path: Path, browser: chromium.Browser) -> None:
+    """An energy that hardly changes has many digits beside its axis."""
+    run = truth_of(load("bouncing_ball", "linear")).trajectory
+    energy = np.c_[0.0 * run.t, -5.0238e-4 - 3e-8 * run.t]
+    figure = figures.energy([Trace(about={"engine": "truth", "profile": ""}, run=replace(run, energy=energy))])
+    section = Section(name="s", title="S", plots=(Plot(name="p", figure=figure),))
+    for name, content in (
+        {"p.html": html.render([Page(name="p", title="P", sections=[section])], (), "")} | html.assets()
+    ).items():
+        (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    assert {
+        width: found for width in (1400, 400) if (found := look(browser, tmp_path / "p.html", width, "light"))
+    } == {}

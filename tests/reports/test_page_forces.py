@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crossbody.cases import Trajectory, from_scene, load
+from crossbody.cases import Mode, Trajectory, from_scene, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines import load as load_engine
 from crossbody.reports.figures.section import Figure
+from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.figures import carrying, force, motion, note, penetration, suits
+from crossbody.reports.pages.figures import MOST_SIGNALS, carrying, force, motion, note, penetration, plots, suits
 from crossbody.reports.pages.friction import hysteresis
 from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs import study
@@ -144,3 +145,87 @@ def test_a_coordinate_that_only_rounding_moves_is_drawn_at_rest(run: Trajectory)
 
     assert drawn(1e-15)["range"] == pytest.approx([-1e-6, 1e-6], rel=1e-3)
     assert "range" not in drawn(1e-2)
+
+
+def many(run: Trajectory, seed: int) -> list[Trace]:
+    """The truth and two engines on a mechanism of many coordinates and contacts, each off by its own size."""
+    draw = np.random.default_rng(seed)
+    n = int(draw.integers(2, 20))
+    sizes, loads = 10.0 ** draw.uniform(-9.0, 0.0, n), 10.0 ** draw.uniform(-3.0, 3.0, n)
+    wide = {name: np.repeat(getattr(run, name), n, axis=1) for name in ("v", "gap", "mode")}
+    exact = replace(run, q=np.repeat(run.q, n, axis=1), lam=run.lam * loads, ledger=None, events=(), **wide)
+    about = {
+        "engine": TRUTH, "profile": "", "contacts": [f"c{k}" for k in range(n)], "scales": [1.0] * n,
+        "coordinates": [{"name": f"x{k}", "unit": "m"} for k in range(n)],
+    }  # fmt: skip
+    off = [replace(exact, q=exact.q + share * sizes) for share in (0.1, 1.0)]
+    runs = [
+        Trace(about=about | {"engine": "fake", "profile": f"p{i}"}, run=one, truth=exact) for i, one in enumerate(off)
+    ]
+    return [Trace(about=about, run=exact), *runs]
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(("name", "axis"), [("motion", "x"), ("force", "lam c")])
+def test_what_matters_most_is_seen_first_and_nothing_that_is_drawn_is_lost(
+    run: Trajectory, name: str, axis: str, seed: int
+) -> None:
+    traces = many(run, seed)
+    shown = [
+        [
+            int(text.removeprefix(axis).partition("<br>")[0])
+            for text in axis_titles(part.figure)
+            if text.startswith(axis)
+        ]
+        for part in plots(name, traces, 200)
+    ]
+    off = np.abs(traces[-1].run.q - traces[0].run.q).max(axis=0) if name == "motion" else traces[0].run.lam.max(axis=0)
+    order = np.argsort(-off)[:MOST_SIGNALS].tolist()
+    assert sorted(k for part in shown for k in part) == sorted(order)
+    assert set(shown[0]) == set(order[: len(shown[0])])
+    assert all(part == sorted(part) for part in shown)
+    assert len(shown[0]) <= 4
+    assert len(shown) == (1 if len(order) <= 4 else 2)
+    folded = [part.folded for part in plots(name, traces, 200)]
+    assert folded[0] == ""
+    assert all(text.startswith(f"{len(part)} more ") for text, part in zip(folded[1:], shown[1:], strict=True))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_error_of_an_impulse_is_what_lies_between_the_lines(run: Trajectory, seed: int) -> None:
+    """A run whose collisions take no time has too few samples for the force of a truth whose collisions take some."""
+    draw = np.random.default_rng(seed)
+    touch = next(event for event in run.events if event.after == Mode.CONTACT)
+    kept = np.unique(np.r_[0, draw.choice(len(run.t), 20), len(run.t) - 1])
+    sparse = Trajectory(
+        **{name: getattr(run, name)[kept] for name in ("t", "q", "v", "gap", "energy", "mode")},
+        lam=np.zeros((len(kept), 1)), events=(replace(touch, impulse=float(draw.uniform(0.5, 3.0))),),
+    )  # fmt: skip
+    beside = replace(sparse, lam=run.lam[kept], events=())
+    lead = trace(run)
+    rigid = Trace(about=lead.about | {"engine": "rigid"}, run=sparse, truth=beside)
+    figure = force([lead, rigid])
+    error = next(line for line in figure["data"] if line["meta"] == "rigid:p" and line["yaxis"] == "y3")
+    ends = [with_collisions(one, one.events)[-1, 0] for one in (run, sparse)]
+    assert numbers(error["y"])[-1] == pytest.approx(abs(ends[1] - ends[0]), rel=1e-4)
+
+
+def test_where_no_force_of_the_truth_is_known_no_error_of_an_impulse_is_drawn(run: Trajectory) -> None:
+    blind = replace(run, lam=np.full_like(run.lam, np.nan), events=())
+    lead = replace(trace(blind), truth=None)
+    drawn = force([lead, Trace(about=lead.about | {"engine": "seeing"}, run=run, truth=blind)])
+    assert [text.partition("<br>")[0] for text in axis_titles(drawn)] == ["lam floor", "impulse"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_force_of_rounding_in_the_truth_sets_neither_scale_nor_limit(run: Trajectory, seed: int) -> None:
+    """Couplings of a robot that falls freely carry 1e-16 N m: what others carry is not off a scale of that."""
+    size = float(10.0 ** np.random.default_rng(seed).uniform(-20.0, -12.0))
+    idles = replace(run, lam=size * run.lam, ledger=None, events=())
+    lead, bears = trace(idles), trace(replace(run, lam=1e-3 * run.lam, ledger=None, events=()), "bears")
+    drawn = force([lead, replace(bears, truth=idles)], limits={"lam_impulse_path": {1e-6: "limit"}})
+    assert "Off scale" not in drawn["layout"]["title"]["text"]
+    assert "range" not in drawn["layout"]["yaxis"]
+    (limit,) = drawn["layout"]["shapes"]
+    weight = 9.81 * 1.0  # of the ball, which a thousandth counts as none
+    assert limit["y0"] > 1e-6 * 1e-4 * weight * float(run.t[-1])

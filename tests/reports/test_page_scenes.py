@@ -326,3 +326,16 @@ def test_an_unknown_mechanism_is_told() -> None:
     (section,) = playback([replace(trace, about=dict(trace.about) | {"mechanism": "../x"})])
     assert "no picture of the mechanism ../x" in section.text
     assert section.template == "section.html"
+
+
+@pytest.mark.parametrize("size", [1e-16, 1e-1])
+def test_a_force_of_rounding_is_no_arrow(size: float) -> None:
+    """A scale of 1e-16 N beside a robot that falls freely says nothing."""
+    given = trace_of(cases.load("bouncing_ball", "listing"))
+    run = given.run
+    energy = np.c_[run.t, run.t]
+    given = replace(given, run=replace(run, lam=size * np.ones_like(run.lam), energy=energy))
+    found = packed([given], scenes.load("ball"))
+    drawn = size > 1e-9
+    assert (found["force"] > 0.0) == drawn
+    assert bool(found["tracks"][0]["arrows"]["bdata"]) == drawn

@@ -21,8 +21,12 @@ pytestmark = [
 ]
 COUNT, SECONDS, TRIALS = 30, 3.0, 5
 FRAME = 1000.0 / 60.0  # time that one of 60 frames a second may take, ms
+SHARE = 1.0 / 3.0  # of a frame that the page may work: the rest is the browser's and other programs'
 LOADED = 1500.0
 """Time in which the main page is to be there with its first plot, ms; others may share the machine."""
+SETTLED = """[...document.querySelectorAll('.plot:not([data-drawn])')]
+    .every((box) => box.getBoundingClientRect().top > innerHeight + 500)"""
+"""Whether plots near the screen are drawn: none is drawn while the bodies move."""
 
 
 @pytest.fixture
@@ -64,6 +68,7 @@ def test_thirty_bodies_move_at_sixty_frames_a_second(tmp_path: Path, browser: ch
     browser.open(page)
     browser.js("document.querySelector('.player').scrollIntoView()")
     browser.wait("document.querySelector('[data-speed]').options.length > 0")
+    browser.wait(SETTLED)
     browser.call("Performance.enable", timeDomain="threadTicks")
     browser.js("document.querySelector('[data-play]').click()")
     before = busy(browser)
@@ -75,4 +80,4 @@ def test_thirty_bodies_move_at_sixty_frames_a_second(tmp_path: Path, browser: ch
     work = (busy(browser) - before) / frames
     print(f"{COUNT} bodies: {frames / SECONDS:.0f} frames a second, {work:.1f} of {FRAME:.1f} ms of work each")
     assert browser.complaints() == []
-    assert work < FRAME
+    assert work < SHARE * FRAME

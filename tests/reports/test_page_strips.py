@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Mode, Trajectory
+from crossbody.reports.pages.figures import note
 from crossbody.reports.pages.sheet import MODE_COLOURS, changing, modes
 from crossbody.reports.runs.store import Trace
 
@@ -25,9 +26,9 @@ def drawn(random: np.random.Generator, engine: str) -> Trace:
 def test_every_interval_of_every_mode_is_a_bar(seed: int) -> None:
     random = np.random.default_rng(seed)
     traces = [drawn(random, engine) for engine in ("one", "two")]
-    assert changing(traces) == ([(0, "left"), (1, "right"), (2, "below")], ["still BILATERAL"])
+    assert changing(traces) == ([(0, "left"), (1, "right"), (2, "below")], [("still", "BILATERAL")])
     figure = modes(traces)
-    assert "still BILATERAL" in figure["layout"]["title"]["text"]
+    assert "BILATERAL throughout, in every engine: still." in note("modes", traces)
     filled = dict.fromkeys([(c, t.about["engine"]) for c in CONTACTS[:3] for t in traces], 0.0)
     for bar in figure["data"]:
         (contact, who), mode = bar["y"][0].split(", "), Mode[bar["name"]]

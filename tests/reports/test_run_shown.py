@@ -53,7 +53,7 @@ def test_a_run_that_nothing_judges_is_not_counted_as_within() -> None:
         row("b", "position", 1.0, Word.INFO),
     ]
     text = sentence(runs_of(rows))
-    assert text.startswith("1 of 1 runs are within all limits.")
+    assert text.startswith("The run is within all limits.")
     assert "Without a limit: b:matched on ball:v." in text
     assert sentence(runs_of(rows[1:])) == "Nothing is judged, since no number has a limit."
 
@@ -67,15 +67,20 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
         row("c", "penetration", 1e-3, Word.INFO),  # without a limit
     ]
     text = sentence(runs_of(rows))
-    assert text.startswith("1 of 2 runs are within all limits. Without a limit: c:matched on ball:v.")
-    assert text.endswith("known cause without a bound: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
+    assert text.startswith("1 of 2 runs is within all limits. Without a limit: c:matched on ball:v.")
+    assert text.endswith("cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
+    shown = click.unstyle(run_shown.table(runs_of(rows), {}, 200)).splitlines()
+    assert [shown[0].split()[-2:], *(line.split()[-2:] for line in shown[2:])] == [
+        ["beyond", "outside"], ["0", "0"], ["2", "0"], ["0", "0"]
+    ]  # fmt: skip
+    assert run_shown.counted(rows) == "4 not judged (2 beyond a limit), 1 within"
     step = row("b", part_of("position", "step"), 2.0e-5, Word.INFO)
     assert "24 times its limit, mostly its step" in sentence(runs_of([*rows, step]))
 
 
 def test_columns_go_before_digits_and_errors_go_last() -> None:
     rows = [row("mujoco", name, 1.23e-4, Word.INFO) for name in run_shown.SHOWN.values()]
-    rows.append(row("mujoco", "velocity", 1.0, Word.EXPECTED))
+    rows += [row("mujoco", "velocity", 1.0, Word.EXPECTED), row("mujoco", "gap_error", 1.0, Word.INFO, 1e-6)]
     times = {("ball:v", "mujoco:matched"): (12.5, 80.0)}
     shown = [
         [head for head in (*run_shown.LEFT_OUT, "position", "outside") if head in table.splitlines()[0]]
@@ -94,7 +99,7 @@ def test_the_sentence_names_who_is_off_by_how_much_and_by_which_part() -> None:
         row("mujoco", part_of("position", "step"), 1e-4, Word.INFO),
     ]  # fmt: skip
     text = sentence(runs_of(rows))
-    assert text.startswith("1 of 2 runs are within all limits.")
+    assert text.startswith("1 of 2 runs is within all limits.")
     assert "mujoco:matched on ball:v (position 0.005, 50 times its limit, mostly its model)" in text
 
 

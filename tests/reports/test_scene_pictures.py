@@ -200,3 +200,14 @@ def test_a_run_of_a_scene_has_its_playback() -> None:
     trace.about["scene"].update(bodies=[{"name": "a", "parent": "b"}])
     (section,) = playback([trace])
     assert "cannot be drawn" in section.text
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_body_is_drawn_as_nothing(seed: int) -> None:
+    """A mass point has no inertia that would give it a size."""
+    draw = np.random.default_rng(seed)
+    mass, com = float(10.0 ** draw.uniform(-3.0, 3.0)), tuple(draw.normal(size=3).tolist())
+    body = Body(name="b", mass=mass, com=com, inertia=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    (solid,) = picture.stage(told(Scene(bodies=(body,)))).solids
+    assert 1000.0 * 4.0 / 3.0 * np.pi * solid["radius"] ** 3 == pytest.approx(mass)
+    np.testing.assert_allclose(solid["points"], [com], atol=1e-6)

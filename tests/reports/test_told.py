@@ -12,6 +12,7 @@ from crossbody.reports.importers.compare import OK, QUANTITIES, Row
 from crossbody.reports.importers.told import grid
 from crossbody.reports.judging.told import NAMED, runs_of, sentence
 from crossbody.reports.judging.verdict import Word
+from crossbody.reports.pages import grid as pages_grid
 
 KINDS = ("within", "expected", "outside", "unbounded", "unlimited", "skipped")
 
@@ -62,12 +63,18 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
     if not judged and by["unlimited"]:
         assert text == "Nothing is judged, since no number has a limit."
         return
-    count, of = map(int, re.findall(r"^(\d+) of (\d+) runs are within all limits", text)[0])
-    assert (count, of) == (len(by["within"]), judged)
-    deviating = re.search(r"(\d+) deviates? as expected \((.*?)\)", text)
+    count = re.match(r"(\d+) of (\d+) runs (is|are) within all limits|The run (is not|is|deviates) ", text)
+    assert count
+    if judged == 1:
+        said = "is" if by["within"] else "deviates" if by["expected"] else "is not"
+        assert count[4] == said
+    else:
+        assert (int(count[1]), int(count[2])) == (len(by["within"]), judged)
+        assert count[3] == ("is" if len(by["within"]) == 1 else "are")
+    deviating = re.search(r"(\d+|The run) deviates? as expected \((.*?)\)", text)
     assert (deviating[2].split(", ") if deviating else []) == by["expected"]
-    assert not deviating or int(deviating[1]) == len(by["expected"])
-    for kind, begin in (("outside", "Off:"), ("unbounded", "Off by a known cause without a bound:")):
+    assert not deviating or deviating[1] in ("The run", str(len(by["expected"])))
+    for kind, begin in (("outside", "Off:"), ("unbounded", "Beyond a limit for a known cause, and not judged:")):
         farthest = sorted(by[kind], key=lambda who: -times[who])
         assert named(text, begin) == (farthest[:NAMED], max(len(farthest) - NAMED, 0))
         for who in farthest[:NAMED]:
@@ -103,3 +110,23 @@ def test_a_grid_has_every_quantity_that_any_engine_has_and_nothing_where_one_lac
     assert [line[0] for line in lines] == [one for one in QUANTITIES if any(one == quantity for _, quantity in told)]
     shown = {(heading[i], line[0]) for line in lines for i, cell in enumerate(line) if i and cell == OK}
     assert shown == told
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_the_sentence_and_the_pages_count_the_same_runs(seed: int) -> None:
+    """A run that is not held to a limit that it is beyond is green nowhere."""
+    rng = np.random.default_rng(seed)
+    kinds = rng.choice(KINDS, rng.integers(2, 9))
+    told = [{"who": f"e{k}:p"} | one for k, kind in enumerate(kinds) for one in rows_of(f"e{k}:p", kind, 7.0)]
+    cells = [pages_grid.whole("ball:hard", "page", who, mine, None) for who, mine in pages_grid.by(told, "who").items()]
+    within = sum(kind == "within" for kind in kinds)
+    words = {"within": "within", "expected": "expected-outside", "outside": "outside", "unbounded": "not judged",
+             "skipped": "skipped"}  # fmt: skip
+    assert [(cell.word, "beyond" in cell.text) for cell, kind in zip(cells, kinds, strict=True) if kind in words] == [
+        (words[kind], kind == "unbounded") for kind in kinds if kind in words
+    ]
+    text = sentence(runs_of(told))
+    if count := re.match(r"(\d+) of \d+ runs", text):
+        assert int(count[1]) == within
+    if "all within" in pages_grid.verdict(told):
+        assert not {"expected", "outside", "unbounded"} & set(kinds)

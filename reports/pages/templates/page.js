@@ -90,7 +90,8 @@ const crossbody = (() => {
     const [show, engine] = [value("verdict"), value("engine")];
     section.querySelectorAll("tbody tr").forEach((row) => {
       const verdict = row.dataset.verdict;
-      const wanted = show === "all" || (show === "judged" ? verdict !== "not judged" : verdict.endsWith("outside") || verdict === "crashed");
+      const wanted = show === "all" || "beyond" in row.dataset
+        || (show === "judged" ? verdict !== "not judged" : verdict.endsWith("outside") || verdict === "crashed");
       const mine = engine ? row.dataset.engine === engine : crossbody.shown(row.dataset.engine);
       row.hidden = !(wanted && mine && words.every((word) => row.textContent.toLowerCase().includes(word)));
     });
@@ -156,13 +157,13 @@ const crossbody = (() => {
 })();
 
 (() => {
-  // On paper: light, every table open.
+  // On paper: light, everything open.
   const root = document.documentElement;
   let [kept, opened] = ["", []];
   addEventListener("beforeprint", () => {
     kept = root.dataset.theme;
     root.dataset.theme = "light";
-    opened = [...document.querySelectorAll("details.table:not([open])")];
+    opened = [...document.querySelectorAll("details:is(.table, .fold):not([open])")];
     opened.forEach((each) => { each.open = true; });
     crossbody.tell("theme");
   });

@@ -1,10 +1,11 @@
 // Playback: every engine's motion on a canvas, over the clock that the plots share.
 (() => {
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const nice = (x) => {
     const ten = 10 ** Math.floor(Math.log10(x) + 1e-9);
     return ten * [1, 2, 5, 10].find((k) => k * ten >= x * 0.999);
   };
+  const SHARP = 2; // device pixels a pixel at most; more cost time and are not seen in what moves
+  const SAID = 100; // time between two readouts while it plays, ms: each has the page laid out and painted
   const FAR = 4; // times its own size that a mechanism goes before it is followed
   const shortNumber = (x) => String(Number(x.toPrecision(3)));
 
@@ -21,8 +22,15 @@
     const [play, clock, readout, speed, view, forces, longer, axes, before, after, differences, follow] =
       ["play", "clock", "readout", "speed", "view", "forces", "longer", "axes", "before", "after", "differences", "follow"].map(find);
     const canvas = root.querySelector("canvas");
-    const g = canvas.getContext("2d");
-    let [now, running, last, turn, tilt, zoom] = [0, false, 0, 0.6, 0.35, 1];
+    const g = canvas.getContext("2d", { alpha: false }); // what is opaque costs less to lay into the page
+    let [now, running, last, said, turn, tilt, zoom] = [0, false, 0, -Infinity, 0.6, 0.35, 1];
+    const box = { width: 0, height: 0 }; // of the canvas; told by an observer, for who asks has the page laid out
+    const colours = {};
+    const dye = () => {
+      const style = getComputedStyle(document.documentElement);
+      for (const name of ["ink", "paper", "soft", "line"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
+    };
+    dye();
     const solids = stage.frames > 0; // bodies with shapes; otherwise points that are joined by lines
     const [fixed, moving] = [false, true].map((moves) => stage.solids.filter((s) => !s.plane && s.body >= 0 === moves));
 
@@ -166,7 +174,7 @@
     };
     const paintSolids = (track, pose, to, ghost) => {
       const frames = Array.from({ length: stage.frames }, (_, body) => crossbody.solids.frame(pose, body));
-      const look = { ink: track.color, paper: colour("--paper"), width: track.truth ? 2 : 1.4, ghost };
+      const look = { ink: track.color, paper: colours.paper, width: track.truth ? 2 : 1.4, ghost };
       crossbody.solids.paint(g, moving, frames, to, look);
       crossbody.solids.bones(g, stage.bones, frames, to);
       if (axes.checked) crossbody.solids.axes(g, frames, to, 0.06 * Math.hypot(...size));
@@ -207,16 +215,16 @@
       });
     };
     const still = (to) => {
-      g.strokeStyle = g.fillStyle = colour("--soft");
+      g.strokeStyle = g.fillStyle = colours.soft;
       g.lineWidth = 1.2;
       stage.still.forEach((each) => shape(each, (p) => p, to, true));
-      for (const { plane } of stage.solids) if (plane) crossbody.solids.grid(g, plane, to, middle, Math.hypot(...size), colour("--line"));
-      crossbody.solids.paint(g, fixed, [], to, { ink: colour("--soft"), paper: colour("--paper"), width: 1, ghost: false });
+      for (const { plane } of stage.solids) if (plane) crossbody.solids.grid(g, plane, to, middle, Math.hypot(...size), colours.line);
+      crossbody.solids.paint(g, fixed, [], to, { ink: colours.soft, paper: colours.paper, width: 1, ghost: false });
     };
     const bar = (to, x, y, h) => {
       // A length, a force and an impulse to measure by.
       const scale = to([middle[0], middle[1], middle[2] || 0])[2];
-      g.fillStyle = g.strokeStyle = colour("--soft");
+      g.fillStyle = g.strokeStyle = colours.soft;
       g.lineWidth = 2;
       g.font = "12px system-ui, sans-serif";
       let line = y;
@@ -225,10 +233,10 @@
         trace([[x, line], [x + value * pixels, line]]);
         g.stroke();
         const label = [`${shortNumber(value)} ${unit}`, x + value * pixels + 6, line + 4];
-        g.strokeStyle = colour("--paper"); // what is drawn behind must not cross the text out
+        g.strokeStyle = colours.paper; // what is drawn behind must not cross the text out
         g.lineWidth = 5;
         g.strokeText(...label);
-        g.strokeStyle = colour("--soft");
+        g.strokeStyle = colours.soft;
         g.lineWidth = 2;
         g.fillText(...label);
         line -= 16;
@@ -241,13 +249,13 @@
     };
     const draw = () => {
       aim();
-      const box = canvas.getBoundingClientRect();
-      const dpr = devicePixelRatio || 1;
+      const dpr = Math.min(devicePixelRatio || 1, SHARP);
       if (!box.width) return;
       if (canvas.width !== Math.round(box.width * dpr)) canvas.width = Math.round(box.width * dpr);
       if (canvas.height !== Math.round(box.height * dpr)) canvas.height = Math.round(box.height * dpr);
       g.setTransform(dpr, 0, 0, dpr, 0, 0);
-      g.clearRect(0, 0, box.width, box.height);
+      g.fillStyle = colours.paper;
+      g.fillRect(0, 0, box.width, box.height);
       g.lineJoin = g.lineCap = "round";
       const shown = tracks.filter((track) => crossbody.shown(track.name));
       if (view.value === "ghosts") {
@@ -267,12 +275,14 @@
           const to = camera(x, y, w, h);
           still(to);
           paint(track, to, h, false);
-          g.fillStyle = colour("--ink");
+          g.fillStyle = colours.ink;
           g.font = "12px system-ui, sans-serif";
           g.fillText(track.name, x + 8, y + 15);
           g.restore();
         });
       }
+      if (running && last - said < SAID) return;
+      said = last;
       readout.textContent = `t = ${now.toFixed(Math.max(0, 4 - Math.floor(Math.log10(end || 1))))} s`;
       clock.value = end ? (1000 * now) / end : 0;
     };
@@ -290,8 +300,9 @@
     const frame = (stamp) => {
       if (!running) return;
       const t = now + (Math.min(stamp - last, 100) / 1000) * Number(speed.value);
-      last = stamp;
-      seek(t >= end ? 0 : t, true);
+      [last, now] = [stamp, t >= end ? 0 : t];
+      draw();
+      crossbody.tell("time", now, root);
       requestAnimationFrame(frame);
     };
     const run = (go) => {
@@ -300,9 +311,10 @@
       play.setAttribute("aria-pressed", go);
       last = performance.now();
       if (go) requestAnimationFrame(frame);
+      else redraw();
     };
 
-    if (follow && moving.length) follow.checked = wide > FAR * across(standing(0));
+    if (follow && moving.length) follow.checked = Math.hypot(...wide) > FAR * Math.hypot(...across(standing(0)));
     const usual = nice((end || 1) / 10);
     for (const factor of [0.01, 0.1, 0.2, 0.5, 1, 2, 5]) {
       const option = new Option(`${shortNumber(usual * factor)} × real time`, usual * factor, factor === 1, factor === 1);
@@ -354,9 +366,11 @@
     });
     crossbody.on("time", (t, from) => { if (from !== root && root.closest("[data-page]").contains(from)) seek(t, false); });
     for (const what of ["engines", "page"]) crossbody.on(what, redraw);
-    crossbody.on("theme", draw); // at once: a print does not wait for a frame
-    new ResizeObserver(redraw).observe(canvas);
-    redraw();
+    crossbody.on("theme", () => { dye(); draw(); }); // at once: a print does not wait for a frame
+    new ResizeObserver(([{ contentRect }]) => {
+      [box.width, box.height] = [contentRect.width, contentRect.height];
+      draw();
+    }).observe(canvas);
   };
   crossbody.each(".player", start);
 })();

@@ -25,10 +25,14 @@
       for (const key of keys) at = at[key] ??= {};
       at[last] = value;
     }
+    for (const key of axes(out)) if (key[0] === "y") out[key] = { ...out[key], automargin: true }; // titles beside long ticks
     if (innerWidth < 600) {
       out.margin = { ...out.margin, l: 58, r: 6 };
       out.font = { ...out.font, size: 10 };
-      for (const key of axes(out)) if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
+      for (const key of axes(out)) {
+        if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
+        if (key[0] === "y") out[key].title = { ...out[key].title, standoff: 4 };
+      }
     }
     return out;
   };
@@ -53,13 +57,17 @@
     const axis = box._fullLayout && box._fullLayout.xaxis;
     if (!axis || !box.hasAttribute("data-time")) return;
     const x = axis.l2p(t);
-    mark.style.display = x >= 0 && x <= axis._length ? "block" : "none";
+    mark.style.visibility = x >= 0 && x <= axis._length ? "visible" : "hidden";
     mark.style.transform = `translateX(${axis._offset + x}px)`;
   };
-  const near = (box) => {
-    const { top, bottom } = box.getBoundingClientRect();
-    return bottom > 0 && top < innerHeight;
-  };
+  const near = new Set(); // those on the screen; told by an observer, for who asks has the page laid out
+  const sight = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) {
+      if (isIntersecting) near.add(target);
+      else near.delete(target);
+    }
+    marks();
+  });
 
   // On a narrow screen a legend beside the plot would take its room: it goes below, a line an entry.
   const narrow = (box, { data, layout }) => {
@@ -100,6 +108,7 @@
     charts.set(box, { mark });
     return Plotly.newPlot(box, figure.data, themed(figure.layout), options).then(() => {
       box.append(mark);
+      sight.observe(box);
       box.dataset.drawn = "";
       if (figure.layout.xaxis?.range) box.dataset.range = JSON.stringify(figure.layout.xaxis.range);
       box.on("plotly_hover", (event) => { if (box.hasAttribute("data-time")) crossbody.tell("time", event.points[0].x, box); });
@@ -127,7 +136,6 @@
   crossbody.on("theme", () => charts.forEach((_, box) => Plotly.relayout(box, scheme(box.layout))));
   crossbody.on("engines", () => charts.forEach((_, box) => Plotly.restyle(box, { visible: visible(box.data) })));
   let clock = null;
-  const marks = () => { if (clock !== null) charts.forEach((_, box) => { if (near(box)) cursor(box, clock); }); };
+  const marks = () => { if (clock !== null) near.forEach((box) => cursor(box, clock)); };
   crossbody.on("time", (t) => { clock = t; marks(); });
-  addEventListener("scroll", marks, { passive: true });
 })();

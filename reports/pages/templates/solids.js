@@ -1,6 +1,12 @@
 // Solids of bodies in space, drawn on a canvas as the outlines of points that a sphere is swept over, those behind first.
 crossbody.solids = (() => {
-  const ROUND = Array.from({ length: 24 }, (_, k) => [Math.cos((k * Math.PI) / 12), Math.sin((k * Math.PI) / 12)]);
+  // Points of a circle of so many pixels, less than a tenth of a pixel off it.
+  const circles = [];
+  const circle = (r) => {
+    const count = Math.max(8, Math.ceil(7 * Math.sqrt(r)));
+    const turn = (k) => (2 * Math.PI * k) / count;
+    return circles[count] ??= Array.from({ length: count }, (_, k) => [Math.cos(turn(k)), Math.sin(turn(k))]);
+  };
   const unit = (p) => p.map((x) => x / (Math.hypot(...p) || 1));
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -57,22 +63,22 @@ crossbody.solids = (() => {
       return { ...solid, points, depth: points.reduce((sum, p) => sum + p[3], 0) / points.length };
     });
     g.strokeStyle = look.ink;
+    g.fillStyle = `color-mix(in srgb, ${look.ink} 22%, ${look.paper})`;
     for (const { points, radius, faces } of drawn.sort((a, b) => b.depth - a.depth)) {
       const r = radius * points[0][2];
-      const around = outline(r ? points.flatMap(([x, y]) => ROUND.map(([c, s]) => [x + r * c, y + r * s])) : points);
+      const round = circle(r);
+      const around = outline(r ? points.flatMap(([x, y]) => round.map(([c, s]) => [x + r * c, y + r * s])) : points);
       trace(g, around);
       g.closePath();
-      if (!look.ghost) {
-        for (const [colour, alpha] of [[look.paper, 1], [look.ink, 0.22]]) {
-          g.fillStyle = colour;
-          g.globalAlpha = alpha;
-          g.fill();
-        }
-        g.globalAlpha = 1;
-      }
+      if (!look.ghost) g.fill();
+      g.lineJoin = r ? "miter" : "round"; // a round outline is smooth as it is
       g.lineWidth = look.width;
       g.stroke();
+      if (!faces.length) continue;
+      const dashes = g.getLineDash();
+      g.setLineDash([]); // edges inside an outline are thin, and dashes cost more than lines
       g.lineWidth = 0.6 * look.width;
+      g.beginPath();
       for (const face of faces) {
         const corners = face.map((i) => points[i]);
         const area = corners.reduce((sum, p, i) => {
@@ -80,10 +86,11 @@ crossbody.solids = (() => {
           return sum + p[0] * next[1] - p[1] * next[0];
         }, 0);
         if (area > 0) continue; // turned away
-        trace(g, corners);
+        corners.forEach(([x, y], i) => (i ? g.lineTo(x, y) : g.moveTo(x, y)));
         g.closePath();
-        g.stroke();
       }
+      g.stroke();
+      g.setLineDash(dashes);
     }
   };
   const bones = (g, pairs, frames, to) => {
