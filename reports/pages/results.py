@@ -10,10 +10,8 @@ from typing import Any
 from pyarrow import ArrowException
 
 from crossbody.cases import InvalidValue, OutputError
-from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import COLUMNS, Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.grid import names
 from crossbody.reports.runs import beside
 from crossbody.reports.runs.files import file_name, listed
 from crossbody.reports.runs.output import is_staged, recover
@@ -52,6 +50,8 @@ class CaseFiles:
         return [self._placed(load(path)) for path in self.paths]
 
     def _placed(self, trace: Trace) -> Trace:
+        from crossbody.reports.figures.styles import label
+
         place = self.places.get(label(trace))
         return trace if place is None else replace(trace, about={**trace.about, "place": place})
 
@@ -127,6 +127,8 @@ def verdicts_of(out: Path) -> list[Row]:
 
 def places_of(verdicts: Sequence[Row]) -> dict[str, int]:
     """Engines that ran on some case, in the order of their rows, profiles of one engine side by side."""
+    from crossbody.reports.pages.grid import names
+
     ran = {row["who"] for row in verdicts if row["verdict"] != Word.SKIPPED}
     found = [who for who in names(row for row in verdicts if row["engine"] != TRUTH) if who in ran]
     return {who: i for i, who in enumerate(found, start=1)}
