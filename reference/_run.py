@@ -332,9 +332,14 @@ class CompiledRun:
             rows = self._vanished() or np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
             return dependence(self.system, np.array(rows), q, v)
         if outcome is Outcome.INCONSISTENT and abs(state["energy_open"]) > state["energy_allowed"]:
+            why = (
+                "energy, power and dynamics contradict each other"
+                if abs(state["energy_open"]) > state["energy_added"]
+                else "there was far more energy before, and what is left is not known"
+            )
             return (
-                f"The energy account is open by {state['energy_open']:.3g} J, where the steps taken admit "
-                f"{state['energy_allowed']:.3g} J: energy, power and dynamics contradict each other, at "
+                f"The energy account is open by {state['energy_open']:.3g} J, where {state['energy_allowed']:.3g} J "
+                f"are admitted: {why}, at "
             )
         if outcome is Outcome.INCONSISTENT:
             return f"The accelerations do not follow the law of rows {marked}, as `rows` has them, after "

@@ -95,21 +95,25 @@ def account(K: Any, s: Any, m: Model, w: Work) -> int:
 
     A step may move every coordinate by its tolerance. That changes the kinetic energy by at most 2 sqrt(T T'), T' that
     of the tolerances as velocities, and the potential energy by about rtol of its size, but no less than what the loads
-    that rows carry do over the tolerance of positions: a weight that hangs at height 0 has no energy at all.
+    that rows carry do over the tolerance of positions: a weight that hangs at height 0 has no energy at all. Nor may it
+    be open by more than half of what is left beside that of the start: where that was far more for an instant it says
+    nothing any more.
     """
     nq, nc = s.nq, s.nc
     K.energy(w.y[:nq], w.y[nq:], m.p, w.e)
     kinetic, potential = w.e[0], w.e[1]
-    booked, moved, load = w.z[nc] - w.z[nc + 1], abs(w.z[nc]) + abs(w.z[nc + 1]), 0.0
+    work, moved, load = 0.0, 0.0, 0.0
     for i in range(nc):
-        booked += w.z[i]
+        work += w.z[i]
         moved += abs(w.z[i])
         load += abs(w.lam0[i])
-    s.energy_size = max(s.energy_size, kinetic + abs(potential) + moved)
-    tolerance = s.rtol * s.energy_size + 2.0 * s.atol * np.sqrt(kinetic * s.energy_unit) + s.atol**2 * s.energy_unit
-    tolerance += s.atol * load
-    s.energy_allowed += OPEN * np.sqrt(nq + s.n) * tolerance
-    s.energy_open = kinetic + potential - s.energy_start - booked
+    through, parts = abs(w.z[nc]) + abs(w.z[nc + 1]), OPEN * np.sqrt(nq + s.n)
+    s.energy_size = max(s.energy_size, kinetic + abs(potential) + through + moved)
+    small = 2.0 * s.atol * np.sqrt(kinetic * s.energy_unit) + s.atol**2 * s.energy_unit + s.atol * load
+    s.energy_added += parts * (s.rtol * s.energy_size + small)
+    left = 0.5 * (kinetic + abs(potential)) + abs(s.energy_start) + parts * (s.rtol * (through + abs(work)) + small)
+    s.energy_allowed = min(s.energy_added, left)
+    s.energy_open = kinetic + potential - s.energy_start - (w.z[nc] - w.z[nc + 1] + work)
     if not np.isfinite(s.energy_open):
         return NOT_FINITE
     return 0 if abs(s.energy_open) <= s.energy_allowed else INCONSISTENT

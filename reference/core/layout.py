@@ -177,7 +177,8 @@ STATE = np.dtype(
         ("energy_unit", "f8"),  # kinetic energy of unit velocities
         ("energy_size", "f8"),
         ("energy_open", "f8"),  # what the account misses
-        ("energy_allowed", "f8"),
+        ("energy_added", "f8"),  # what all steps may have added
+        ("energy_allowed", "f8"),  # by how much it may be open
         # counters
         ("steps", "i8"),
         ("rejected", "i8"),

@@ -115,6 +115,44 @@ def test_an_account_that_stays_open_is_not_finished(rtol):
     assert simulate(_pushed(_half_the_input), [0.5], [0.0], 1.0, rtol=rtol, inputs=inputs).outcome.ok
 
 
+@kernels.dynamics
+def _comet(t, q, v, u, p, M, f, w):
+    r = np.sqrt(q[0] * q[0] + q[1] * q[1])
+    for i in range(2):
+        M[i, 0] = 1.0
+        f[i] = -q[i] / r**3
+
+
+@kernels.gaps
+def _no_gaps(t, q, v, p, h, hd):
+    pass
+
+
+@kernels.rows
+def _no_rows(t, q, v, p, w, idx, na, H, h, Hdv):
+    pass
+
+
+@kernels.energy
+def _comet_energy(q, v, p, e):
+    e[0] = 0.5 * (v[0] * v[0] + v[1] * v[1])
+    e[1] = -1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1])
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4, 1e-6])
+@pytest.mark.parametrize("aside", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_energy_that_is_lost_in_an_instant_of_far_more_is_told(aside, rtol):
+    """A comet that falls within aside^2 / 2 of its sun has as many times its energy there: it may leave with any."""
+    system = System(n=2, mass_block=1, dynamics=_comet, gaps=_no_gaps, rows=_no_rows, energy=_comet_energy)
+    run = simulate(system, [1.0, 0.0], [0.0, aside], 2.0, rtol=rtol, ledger=True)
+    energy = run.total_energy
+    if run.outcome is Outcome.FINISHED:
+        assert abs(energy[-1] - energy[0]) < 2.0 * abs(energy[0])
+    else:
+        assert aside < 1e-1
+        assert run.outcome is Outcome.STEP_TOO_SMALL or "there was far more energy before" in run.message
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(60))
 def test_random_runs_close_their_account_by_far(seed):
