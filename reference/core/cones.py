@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core import jams
 from crossbody.reference.core.coulomb import solve
 from crossbody.reference.core.filters import STAGES_RANGE
-from crossbody.reference.core.friction import bound, has_friction, is_dry, is_tangent, most_drift, slip
-from crossbody.reference.core.jams import determinant
+from crossbody.reference.core.friction import bound, has_friction, is_tangent, most_drift, slip
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
@@ -33,13 +33,7 @@ def watch_friction(s: Any, m: Model, w: Work, out: Array) -> None:
         i = w.idx[j]
         if has_friction(m, i) and not w.slides[i]:
             out[i] = margin(s, m, w, i)
-    value, known = 0.0, False
-    for j in range(s.na):
-        i = w.idx[j]
-        if has_friction(m, i) and w.slides[i] and not is_dry(m, i):
-            if not (known and w.reached[j]):
-                value, known = determinant(s, m, w, j), True
-            out[i] = value
+    jams.watch(s, m, w, out)
 
 
 @compiled

@@ -215,7 +215,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     any_gap, any_multiplier, watched = False, False, s.watched
     s.watched = 0
     hit, kind, unilateral, follows = w.hit, w.kind, m.unilateral, m.follows
-    s.jammed = s.frictional and s.na > 0 and ask(JAMS, s, m, w, NOTHING) > 0.0
+    s.jammed = s.frictional and s.na > 0 and ask(JAMS, s, m, w, NODES - 1) < 0.0
     for i in range(s.nc):
         hit[i] = NEVER
         kind[i] = NONE

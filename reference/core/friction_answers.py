@@ -67,7 +67,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     TURNS_ASIDE     1 if a contact whose slip falls to zero along its direction of reference has one across it there
     BEGIN_SLIP      of contacts that have reached their bounds, there
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
-    JAMS            1 if contacts that slide have passed a jam
+    JAMS            how far the contact that slides nearest to a jam is from it; that of each into w.cones[i]
     SETTLED         follow what the law leaves open, where modes have settled
     """
     if what == FACTOR:
@@ -108,7 +108,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == SETTLED:
         undetermined.follow_shares(s, m, w, True)
     elif what == JAMS:
-        return 1.0 if jams.any_jam(s, m, w) else 0.0
+        return float(jams.watch(s, m, w, w.cones[i]))
     elif what == BEGIN:
         slips.begin(s, m, w)
     return 0.0

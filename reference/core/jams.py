@@ -11,7 +11,7 @@ from crossbody.reference.core.complete import RANK, factor_complete
 from crossbody.reference.core.friction import has_friction, is_dry, is_tangent
 from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.core.unknowns import fill
-from crossbody.reference.kinds import Bytes, Floats, Index
+from crossbody.reference.kinds import Array, Bytes, Floats, Index
 
 JAMMED = 1e-9  # determinant, of rows of size 1, that counts as none
 
@@ -118,16 +118,18 @@ def determinant(s: Any, m: Model, w: Work, j: int) -> float:
 
 
 @compiled
-def any_jam(s: Any, m: Model, w: Work) -> bool:
-    """Whether contacts that slide have passed a jam, by the rows last factored.
+def watch(s: Any, m: Model, w: Work, out: Array) -> float:
+    """Write how far every contact that slides is from a jam, by the rows last factored; the least, inf if none slides.
 
-    Their forces need not tell: they may stay as they are but for an instant that no stage of a step meets.
+    Behind a jam it is negative. Forces need not tell: they may stay as they are but for an instant that no stage of a
+    step meets.
     """
-    known = False
+    value, least, known = 0.0, np.inf, False
     for j in range(s.na):
         i = w.idx[j]
-        if has_friction(m, i) and w.slides[i] and not is_dry(m, i) and not (known and w.reached[j]):
-            if determinant(s, m, w, j) < 0.0:
-                return True
-            known = True
-    return False
+        if has_friction(m, i) and w.slides[i] and not is_dry(m, i):
+            if not (known and w.reached[j]):
+                value, known = determinant(s, m, w, j), True
+            out[i] = value
+            least = min(least, value)
+    return float(least)

@@ -42,7 +42,7 @@ def begin(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def _face(m: Model, w: Work, i: int, rate: Array) -> None:
+def face(m: Model, w: Work, i: int, rate: Array) -> None:
     """Take the direction of the present slip velocity of contact i for that of reference."""
     size = slip(m, w, i, rate)
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
@@ -127,7 +127,7 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
                 count_from_none(m, w, i)
                 s.watched = 0
             if slip(m, w, i, rate) > small_slip(s):
-                _face(m, w, i, rate)
+                face(m, w, i, rate)
             if m.tangents[i] > 1:
                 s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
             if _lingers(s, m, w, i, rate):

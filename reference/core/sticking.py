@@ -13,7 +13,6 @@ from crossbody.reference.core.friction import (
     has_friction,
     is_decided,
     is_dry,
-    slip,
     small_slip,
 )
 from crossbody.reference.core.guards import CONE
@@ -36,7 +35,7 @@ from crossbody.reference.core.mode_set import (
     size_along,
 )
 from crossbody.reference.core.others import count_others
-from crossbody.reference.core.slips import note_speed
+from crossbody.reference.core.slips import face, note_speed
 
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 AT_BOUND = 2.0 * (1.0 - INSIDE)  # part of its bound below it at which a contact has reached it, where loads are shared
@@ -117,19 +116,15 @@ def _found(s: Any, m: Model, w: Work) -> bool:
 
 
 @compiled
-def _fewer_begin(s: Any, w: Work) -> bool:
-    """Let none begin to slide for being at its bound beside another one; whether there are such."""
+def _found_if_fewer_begin(s: Any, m: Model, w: Work) -> bool:
+    """Whether a consistent set is found if none begins to slide for being at its bound beside another one."""
     fewer = False
     for i in range(s.nc):
         if w.begins[i] == BESIDE:
             w.begins[i], fewer = 0, True
-    return fewer
-
-
-@compiled
-def _found_anew(s: Any, m: Model, w: Work) -> bool:
-    look(s, m, w)
-    return _found(s, m, w)
+    if fewer:
+        look(s, m, w)
+    return bool(fewer and _found(s, m, w))
 
 
 @compiled
@@ -177,7 +172,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     note_speed(s, m, w, w.rate)
     s.leeway, s.held_unknowns, s.pressed_in = 0.0, -1, -1
     look(s, m, w)
-    if not (_found(s, m, w) or (_fewer_begin(s, w) and _found_anew(s, m, w))):
+    if not (_found(s, m, w) or _found_if_fewer_begin(s, m, w)):
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
         if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
@@ -208,9 +203,7 @@ def _slide_on(s: Any, m: Model, w: Work) -> None:
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i) and w.slid[i]:
-            size = slip(m, w, i, w.rate)
-            for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
-                w.way[w.idx[c]] = (w.hda[c] - w.rest[w.idx[c]]) / size if size > 0.0 else 0.0
+            face(m, w, i, w.rate)
             put(m, w, i, SLIP)
     evaluate_set(s, m, w)
 

@@ -14,7 +14,6 @@ from crossbody.reports.figures.styles import label, style
 from crossbody.reports.judging.told import beyond, share
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
-from crossbody.reports.pages.figures import suits
 from crossbody.reports.pages.friction import friction, hysteresis
 from crossbody.reports.pages.html import Page
 from crossbody.reports.pages.playback import playback
@@ -112,7 +111,7 @@ def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[S
     if not traces:
         return []
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
-    drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES if suits(name, traces)}
+    drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES}
     return [
         Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces), plots=plots)
         for name, plots in drawn.items() if plots

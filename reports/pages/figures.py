@@ -314,11 +314,6 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     return sheet.done()
 
 
-def suits(name: str, traces: Sequence[Trace]) -> bool:
-    """Whether a figure has anything to show."""
-    return name not in SIGNALS or bool(SIGNALS[name][1](traces))
-
-
 def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> list[Plot]:
     """One figure if there is anything in it; of many signals those that matter most, the others drawn folded."""
     _, draw = FIGURES[name]
@@ -327,6 +322,8 @@ def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limi
         return [Plot(name=f"plot-{name}", figure=figure, time=True)] if figure["data"] else []
     noun, ranked, more = SIGNALS[name]
     order = ranked(traces)[:MOST_SIGNALS]
+    if not order:
+        return []
     cut = FIRST if len(order) > FIRST + 1 else len(order)
     first, rest = sorted(order[:cut]), sorted(order[cut:])
     found = [Plot(name=f"plot-{name}", figure=draw(traces, points, limits, first), time=True)]

@@ -64,25 +64,27 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene, share: float = 1.0) -> 
     about = traces[0].about
     parameters = {**about["parameters"], "scene": about.get("scene")}
     stage = scene.stage(parameters)
-    pushing = _pushing(traces, scene, parameters)
+    bearing = carrying(traces, idle(traces[0].run))
+    pushing = _pushing(traces, scene, parameters, bearing)
     width = 1 + scene.poses(traces[0].run.q[:1], parameters)[0].size + 2 * stage.dimensions * int(pushing.sum())
     frames = int(np.clip(share * ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
-    least = idle(traces[0].run)
     drawn = [_track(trace, i, scene, parameters, frames, pushing) for i, trace in enumerate(traces) if len(trace.run.t)]
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
         "end": max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0),
-        "force": typical(_largest(trace.run.lam[:, carrying(traces, least)]) for trace in traces),
+        "force": typical(_largest(trace.run.lam[:, bearing]) for trace in traces),
         "impulse": typical(_largest(np.array([e.impulse for e in trace.run.events])) for trace in traces),
         "events": events(traces[0].run),
     }  # fmt: skip
 
 
-def _pushing(traces: Sequence[Trace], scene: scenes.Scene, parameters: Mapping[str, Any]) -> NDArray[np.bool_]:
+def _pushing(
+    traces: Sequence[Trace], scene: scenes.Scene, parameters: Mapping[str, Any], bearing: Sequence[int]
+) -> NDArray[np.bool_]:
     """Which arrows have a length with the rows that ever carry more than rounding, in some motion's poses."""
     runs = [trace.run for trace in traces if len(trace.run.t)]
     pressed = np.zeros(runs[0].lam.shape[1], dtype=bool)
-    pressed[carrying(traces, idle(traces[0].run))] = True
+    pressed[bearing] = True
     pressed[[event.contact for run in runs for event in run.events if event.impulse]] = True
     q = np.concatenate([run.q[np.linspace(0, len(run.t) - 1, FEWEST).astype(np.intp)] for run in runs])
     drawn = scene.arrows(q, np.broadcast_to(pressed.astype(np.float64), (len(q), len(pressed))), parameters)

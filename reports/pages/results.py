@@ -97,11 +97,12 @@ def read(out: Path, against: Path | None = None) -> Results:
     audited = read_json(out / "audit.json")["rows"]
     check_fields(out / "audit.json", audited, AUDITED)
     audits = by(audited, "case")
-    cases, times = _cases(out, verdicts)
+    places = places_of(verdicts)
+    cases, times = _cases(out, verdicts, places)
     base = None if against is None else verdicts_of(against)
     return Results(
         out=out, verdicts=verdicts, rows=by(verdicts, "label"), audits=audits, told=told,
-        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, places=places_of(verdicts), base=base,
+        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, places=places, base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
 
@@ -114,9 +115,9 @@ def verdicts_of(out: Path) -> list[Row]:
     rows: list[Row] = table["rows"]
     if lacking := [name for name in COLUMNS if any(name not in row for row in rows)]:
         versions = table.get("provenance", {}).get("versions", {})
-        by = versions.get("crossbody", "another version") if isinstance(versions, dict) else "another version"
+        version = versions.get("crossbody", "another version") if isinstance(versions, dict) else "another version"
         raise OutputError(
-            f"{out / 'verdicts.json'} was written by crossbody {by}: its verdicts have no {', '.join(lacking)}; "
+            f"{out / 'verdicts.json'} was written by crossbody {version}: its verdicts have no {', '.join(lacking)}; "
             "run the cases again."
         )
     check_fields(out / "verdicts.json", rows, JUDGED)
@@ -134,7 +135,7 @@ def places_of(verdicts: Sequence[Row]) -> dict[str, int]:
     return {who: i for i, who in enumerate(found, start=1)}
 
 
-def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], Times]:
+def _cases(out: Path, verdicts: Sequence[Row], places: Mapping[str, int]) -> tuple[tuple[CaseFiles, ...], Times]:
     """Every case that has a verdict or a motion, and the run times with what each engine took in all."""
     paths: dict[str, list[Path]] = {}
     abouts: dict[str, Mapping[str, Any]] = {}
@@ -153,7 +154,6 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
         paths.setdefault(label, []).append(path)
         abouts.setdefault(label, about)
         times[label, who] = told["wall_s"], about.get("took_s")
-    places = places_of(verdicts)
     labels = dict.fromkeys([*(row["label"] for row in verdicts), *paths])
     ran = by((row for row in verdicts if row["verdict"] != Word.SKIPPED), "label")
     wanted = {label: list(dict.fromkeys(row["who"] for row in rows)) for label, rows in ran.items()}
@@ -169,7 +169,7 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
 
 def times_of(out: Path) -> Times:
     """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile."""
-    return _cases(out, verdicts_of(out))[1]
+    return _cases(out, verdicts_of(out), {})[1]
 
 
 def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:
@@ -192,7 +192,8 @@ def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
     """One motion of a folder, "truth" or of an engine:profile, and its place among those of its case."""
     from crossbody.reports.figures.styles import label
 
-    found = _cases(out, verdicts_of(out))[0]
+    verdicts = verdicts_of(out)
+    found = _cases(out, verdicts, places_of(verdicts))[0]
     mine = next((one for one in found if one.paths and case in ("", one.label)), None)
     if mine is None:
         raise InvalidValue(f"{out} has no motion of {case or 'a case'}; it has {_listed(one.label for one in found)}.")

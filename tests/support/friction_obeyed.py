@@ -74,29 +74,31 @@ class _Rows:
         return np.flatnonzero((mode != Mode.FREE) & (mode != Mode.BALLISTIC) & ~known)
 
     @cached_property
+    def all(self) -> np.ndarray:
+        """Return H of all rows."""
+        return self.made.constraint(self.q, self.v)[0]
+
+    @cached_property
     def moved(self) -> np.ndarray:
         """M^-1 H^T of the unknown rows."""
-        rows = self.made.constraint(self.q, self.v)[0][self.unknown]
-        return np.linalg.solve(self.made.mass_matrix(self.q, self.v), rows.T)
+        return np.linalg.solve(self.made.mass_matrix(self.q, self.v), self.all[self.unknown].T)
 
     @cached_property
     def size(self) -> np.ndarray:
         """Return the square roots of the accelerations of the unknown rows by their own multipliers of 1."""
-        rows = self.made.constraint(self.q, self.v)[0][self.unknown]
-        size = np.sqrt(np.einsum("ij,ji->i", rows, self.moved))
+        size = np.sqrt(np.einsum("ij,ji->i", self.all[self.unknown], self.moved))
         return np.where(size > 0.0, size, 1.0)
 
     @cached_property
     def matrices(self) -> tuple[np.ndarray, np.ndarray]:
         """How the unknown rows accelerate with their multipliers alone, and with the friction of slips beside them."""
-        rows = self.made.constraint(self.q, self.v)[0]
-        forces = rows[self.unknown]
+        forces = self.all[self.unknown]
         for a, i in enumerate(self.unknown):
             force = self.lam[self.ways(i)]
             if self.mode[i] == Mode.SLIP and np.any(force):
-                forces[a] += self.mu * force / np.linalg.norm(force) @ rows[self.ways(i)]
+                forces[a] += self.mu * force / np.linalg.norm(force) @ self.all[self.ways(i)]
         scale = np.outer(self.size, self.size)
-        return rows[self.unknown] @ self.moved / scale, (forces @ self.moved).T / scale
+        return self.all[self.unknown] @ self.moved / scale, (forces @ self.moved).T / scale
 
     def jammed(self) -> float:
         """Determinant of the rows that do not depend on each other: negative where contacts have passed a jam."""
