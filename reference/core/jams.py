@@ -93,6 +93,7 @@ def determinant(s: Any, m: Model, w: Work, j: int) -> float:
         for a in range(s.unknowns):
             w.seen[a] = not w.reached[w.unknown[w.down[a]]]
         return _signed_product(w.matrix, s.unknowns, w.down, w.across, w.seen) - JAMMED
+    s.spent_factors = 1
     fill(s, m, w)
     count = 0
     for a in range(s.unknowns):

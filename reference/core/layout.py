@@ -147,6 +147,8 @@ STATE = np.dtype(
         ("closed", "i8"),  # rows of loops that were eliminated before
         ("rank_first", "i8"),
         ("rank_second", "i8"),
+        ("most_second", "i8"),  # at most so many were asked for
+        ("spent_factors", "i8"),  # their memory has served for something else since
         ("held_unknowns", "i8"),  # when modes were decided: which sticking rows depend on others stays,
         ("held_rank", "i8"),  # of so many that do not
         ("grown", "f8"),  # the pivot at which that is decided anew,

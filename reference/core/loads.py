@@ -26,6 +26,7 @@ MOST_SPREADS = 200  # times more where a contact would bear more than it can: ot
 def factor_in_turn(s: Any, m: Model, w: Work, most: int) -> None:
     """Factor the normal rows alone, and what they leave of the sticking ones, of which `most` count as independent."""
     count, total = s.normals, s.unknowns
+    s.most_second, s.spent_factors = most, 0
     fill(s, m, w)
     for a in range(count):
         for b in range(count):
@@ -68,6 +69,12 @@ def _start(s: Any, w: Work) -> None:
 @compiled
 def solve_in_turn(s: Any, m: Model, w: Work) -> None:
     """Solve for w.found the normal rows, and in their null space the sticking ones, by loads that suit these."""
+    if s.spent_factors:
+        for a in range(s.unknowns):
+            w.known[a] = w.found[a]
+        factor_in_turn(s, m, w, s.most_second)
+        for a in range(s.unknowns):
+            w.found[a] = w.known[a]
     _start(s, w)
     for _ in range(SHARINGS if s.rank_second < s.unknowns - s.normals else 1):
         _weigh(s, m, w)

@@ -359,12 +359,25 @@ def _stays(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
 
 @compiled
+def _rests(s: Any, w: Work, i: int) -> bool:
+    """Whether row i is at its surface as far as rounding tells, where loads jump, and was not let go at this instant.
+
+    Which of the corners of a box that rests are a little open, or below, rounding decides. Where forces come on they
+    press together: from a gap of rounding one would gain a speed far above it.
+    """
+    lies = s.frictional and s.jumps and abs(w.gap[i]) <= s.touch and abs(w.rate[i]) <= slow(s)
+    return bool(lies and w.let_go[i] != s.t)
+
+
+@compiled
 def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the level machine puts row i at this instant."""
     h, rate = w.gap[i], w.rate[i]
     if is_active(mode[i]):
         return released_mode(mode[i], h) if w.lam[i] < -w.noise[i] else int(mode[i])
     collides = s.frozen != 0 and m.beta[i, 0] > 0.0
+    if _rests(s, w, i):
+        return active_mode(s, m, w, i) if _would_press(K, s, m, w, mode, i, False) else int(mode[i])
     if h > (s.touch if collides and mode[i] == FREE else 0.0):
         return FREE
     if collides and rate < -slow(s):

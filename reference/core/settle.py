@@ -86,6 +86,8 @@ def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         _keep_strongest(K, s, m, w, b)
     for i in range(s.nc):
         if w.struck[i] != b.mode[i]:
+            if s.frictional and is_active(b.mode[i]):
+                w.let_go[i] = s.t
             move(s, b, i, w.struck[i])
             changed[i] = 1
             count += 1
@@ -141,6 +143,7 @@ def _decide_friction(s: Any, m: Model, w: Work, b: Buffers) -> int:
                 after = released_mode(b.mode[i], w.gap[i])
             if after != b.mode[i]:
                 change(s, b, i, after)
+                w.let_go[i] = s.t if w.state[i] == FREE else w.let_go[i]
     return code
 
 
@@ -253,7 +256,7 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         of the history marks the rows that switch for ever.
     """
     s.lenient, s.barred = np.inf if s.frictional else 1.0, 0
-    if s.frozen or s.fsm == MEMORYLESS:
+    if s.frozen or s.frictional or s.fsm == MEMORYLESS:
         s.touch = touching(s, w)
     code = _iterate(K, s, m, w, b)
     rounds = 0
@@ -273,6 +276,7 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if s.frictional and code == 0:
         code = evaluate(K, s, m, w, b.mode)
         ask(SETTLED, s, m, w, NOTHING)
+    s.touch = 0.0 if s.frictional else s.touch
     begin_watch(K, s, m, w)
     s.lenient = np.inf
     return int(code)

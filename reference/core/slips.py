@@ -51,12 +51,18 @@ def face(m: Model, w: Work, i: int, rate: Array) -> None:
 
 @compiled
 def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
-    """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips."""
+    """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips.
+
+    What their bodies gain while a row returns to its law counts too: in a scene at rest speeds are those of errors.
+    """
     for i in range(s.nc):
         if has_friction(m, i):
             s.slip_speed = max(s.slip_speed, slip(m, w, i, rate), abs(rate[i]))
     for j in range(s.na):
         i, size = w.idx[j], 0.0
+        returns = max(m.alpha[i, 1], np.sqrt(m.alpha[i, 0])) if has_friction(m, i) else 0.0
+        if returns > 0.0:
+            s.slip_speed = max(s.slip_speed, w.scale[j] / returns)
         for c in range(m.span[i, 0], m.span[i, 1] if is_tangent(m, i) else 0):
             size += abs(w.H[j, c] * w.y[s.nq + c])
         s.slip_speed = max(s.slip_speed, size)

@@ -16,7 +16,7 @@ from crossbody.reference.core.friction import (
     small_slip,
 )
 from crossbody.reference.core.guards import CONE
-from crossbody.reference.core.layout import NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
+from crossbody.reference.core.layout import FREE, NO_CONSISTENT_MODES, PAINLEVE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loads import INSIDE
 from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_path import approached
@@ -88,13 +88,15 @@ def _begin_at_last(s: Any, m: Model, w: Work) -> None:
     """Let contacts slide that have reached their bounds here before and stuck again, if that is nearly consistent.
 
     At its bound one that sticks and one that slides differ by rounding, which must not have them take turns for ever.
+    One whose load and bound vanish together lets go.
     """
     tried, before = False, s.leeway
     keep(s, w)
     for j in range(s.na):
         i = w.idx[j]
         if w.begins[i] == ITSELF and w.state[i] == STICK:
-            put(m, w, i, SLIP)
+            light = not is_dry(m, i) and w.la[j] * w.gram[j, j] <= IDLE * s.push_scale
+            put(m, w, i, FREE if light else SLIP)
             tried = True
     if tried:
         s.leeway = max(s.leeway, IDLE * s.push_scale)

@@ -119,6 +119,7 @@ def _take_shares(s: Any, m: Model, w: Work) -> None:
     """Leave in w.open_rate by how much v' of two shares may differ, for the rows last factored."""
     w.open_rate[:] = 0.0
     if s.na > 0 and s.dependent_rows > 0:
+        s.spent_factors = 1
         fill(s, m, w)
         rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across, s.unknowns)
         for k in range(rank, s.unknowns):

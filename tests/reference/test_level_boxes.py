@@ -42,7 +42,7 @@ def test_level_boxes_land(mu: float, rtol: float) -> None:
     assert account(motion) < 1e3 * rtol
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(12), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(12, 200))])
 def test_level_boxes_of_any_weight_land(seed: int) -> None:
     rng = np.random.default_rng(seed)
     law = RowLaw(a0=float(10 ** rng.uniform(3.5, 4.5)), a1=float(rng.uniform(5.0, 100.0)))

@@ -14,8 +14,8 @@ from crossbody.cases.scene import Scene
 from crossbody.reference import System
 from crossbody.reference.tree.system import system
 
-STILL = 1e4  # times rtol, of the largest speed: below, a slip that begins counts from what counted as none
-DRIFT = 1e3  # times rtol, of the largest speed: a contact that sticks is no faster
+STILL = 1e4  # times rtol, of the speeds of a motion: below, a slip that begins counts from what counted as none
+DRIFT = 1e3  # times rtol, of the same: a contact that sticks is no faster
 BELOW = 1e4  # times rtol, of the largest coordinate: a contact that is FREE is no deeper
 RANK = 1e-9  # of rows of size 1: below, one depends on others
 JAMMED = 1e-8  # determinant, of rows of size 1
@@ -31,17 +31,23 @@ def obeys(scene: Scene, run: Trajectory, mu: float, rtol: float) -> int:
     """
     instants = {event.t for event in run.events}
     made, count = system(scene, case_of(scene).law), 0
-    most = float(np.abs(run.lam).max(initial=0.0))
+    most, gained = float(np.abs(run.lam).max(initial=0.0)), _gained(scene, made)
     for t, q, v, lam, mode in zip(run.t, run.q, run.v, run.lam, run.mode, strict=True):
         if t in instants or (run.outcome is Outcome.PAINLEVE and t == run.t[-1]):  # where no set of modes is known
             continue
         assert np.all(np.isfinite(lam))
         gap, rate = made.gap(q, v)
-        small = rtol * float(np.abs(run.v).max())
+        small = rtol * max(float(np.abs(run.v).max()), gained)
         count += _rubs(_Rows(made, q, v, mode, lam, rate, mu), small)
         _presses(made, lam, mode, gap, most, rtol * max(1.0, float(np.abs(run.q).max())))
     assert account(run) < 1e3 * rtol * max(1.0, float(np.abs(run.total_energy).max()))
     return count
+
+
+def _gained(scene: Scene, made: System) -> float:
+    """What a body gains by gravity while a contact returns to its law, m/s: at rest speeds tell of errors alone."""
+    returns = np.maximum(made.a1, np.sqrt(made.a0))[np.asarray(made.unilateral, dtype=bool)]
+    return float(np.linalg.norm(scene.gravity) / returns.min(initial=np.inf))
 
 
 @dataclass(frozen=True)
