@@ -288,7 +288,7 @@ class _Judge:
 
     def told(self, metric: str, word: Word, why: str) -> tuple[Word, str]:
         """What is said of a number: one outside is not judged where a tolerance was asked for that hides any fault."""
-        stands = metric in EXACT or (metric == "law_residual" and not self.case.rubs)  # slips that vanish turn friction
+        stands = metric in EXACT or metric == "law_residual"
         if word is Word.OUTSIDE and metric == "rate_residual" and self.looser > 1.0:
             return Word.INFO, "Its samples lie as far apart as the tolerance that was asked for lets its steps be."
         if word is not Word.OUTSIDE or stands or not self.hides():

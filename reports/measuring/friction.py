@@ -89,14 +89,12 @@ def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats,
     return slides, speed, force
 
 
-def off_slip(run: Trajectory, case: Case) -> float:
-    """Return how far friction is at most from -mu lam_n s, s along the slip, N; 0 where nothing slides."""
+def off_bound(run: Trajectory, case: Case) -> float:
+    """Return how far friction of what slides is at most from mu lam_n, N, whatever its direction; 0 without slides."""
     if (found := rubbing(run, case)) is None:
         return 0.0
-    slides, speed, _ = sliding(run, found)
-    bound = (found.mu * found.normal)[slides][:, None]
-    off = found.force[slides] + bound * found.slip[slides] / speed[slides][:, None]
-    return float(np.max(np.linalg.norm(off, axis=-1), initial=0.0))
+    off = np.linalg.norm(found.force, axis=-1) - found.mu * found.normal
+    return float(np.max(np.abs(off), initial=0.0, where=run.mode[:, found.rows] == Mode.SLIP))
 
 
 def cumulated(run: Trajectory, values: Floats) -> Floats:

@@ -41,6 +41,23 @@ def with_collisions(run: Trajectory, events: Sequence[Event]) -> Floats:
     return total
 
 
+def true_impulse(run: Trajectory, exact: Trajectory, whole: Trajectory) -> Floats:
+    """Return the cumulative impulse of the truth beside samples of a run (m, nc), N s.
+
+    By the same rule over the same samples, so that the error of the rule cancels. A run whose collisions take no
+    time has too few samples for the forces of a truth whose collisions take some: there the truth's own count.
+
+    Args:
+        run: whose collisions may take no time.
+        exact: the truth at its samples.
+        whole: the truth at its own.
+    """
+    if not any(event.impulse for event in run.events) or any(event.impulse for event in whole.events):
+        return with_collisions(exact, whole.events)
+    own = with_collisions(whole, whole.events)
+    return np.stack([np.interp(exact.t, whole.t, row) for row in own.T], axis=1)
+
+
 def told(run: Trajectory) -> NDArray[np.bool_] | None:
     """Which rows have multipliers (nc,); None if lam is not known.
 

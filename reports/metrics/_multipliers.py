@@ -11,7 +11,7 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.equations import equations
-from crossbody.reports.measuring.impulse import away, cumulative, told, with_collisions
+from crossbody.reports.measuring.impulse import away, cumulative, told, true_impulse, with_collisions
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
 
@@ -89,7 +89,7 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
     Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time
     included. Releases are matched too, as lam jumps there: a sample on the wrong side would count for half
-    its step. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
+    its step. The truth's is `true_impulse`. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
     known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
     many; N s where only the run's does.
     """
@@ -98,7 +98,7 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     if np.isnan(run.lam).any():
         return math.nan
-    theirs = with_collisions(exact, truth.trajectory.events)
+    theirs = true_impulse(run, exact, truth.trajectory)
     scale = float(np.max(np.abs(theirs), initial=0.0))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]

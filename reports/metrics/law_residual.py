@@ -5,8 +5,9 @@ The residual of the law (docs/explanation, contact law), recomputed by us from q
     (H M^-1 H^T) lam = -(H M^-1 f + H'v + a1 h' + a0 h + a2 h^3)
 
 on the rows that the run has closed, with b0 and b1 where they are in COLLISION; of rows that
-depend on each other the part that exerts a force. Friction that slides is -mu lam_n s, s along
-the slip. It tells an engine that follows another law from one that follows this one.
+depend on each other the part that exerts a force. Friction that slides is mu lam_n in size;
+`friction_angle` has its direction, which a slip that vanishes turns at any tolerance. It tells
+an engine that follows another law from one that follows this one.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reference import System
 from crossbody.reports.measuring.equations import equations, finite, spread
-from crossbody.reports.measuring.friction import off_slip
+from crossbody.reports.measuring.friction import off_bound
 from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
@@ -127,7 +128,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     Where all carry next to nothing it is over what `idle` rows are measured by.
 
     Where contacts slide the law of the other rows is asked for with the friction that the run
-    has, and friction for what it is by the slip. None where nothing closes, and where a
+    has, and friction for its size. None where nothing closes, and where a
     controller or discrete variables act that a row of the run does not show.
     """
     system = equations(case)
@@ -143,7 +144,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         inputs = system.activations.extended(inputs)
     if inputs is not None:  # where they jump, a sample does not say on which side it stands
         looked &= ~np.isin(run.t, inputs.times)
-    worst, scale = off_slip(run, case), 0.0
+    worst, scale = off_bound(run, case), 0.0
     slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
     chosen = spread(run, looked)
     patterns, which = np.unique(

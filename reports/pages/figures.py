@@ -12,7 +12,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure, Plot
 from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import Row
-from crossbody.reports.measuring.impulse import with_collisions
+from crossbody.reports.measuring.impulse import true_impulse, with_collisions
 from crossbody.reports.measuring.scale import energy as energy_of
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
@@ -183,7 +183,7 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
     total = float(np.nanmax(np.abs(summed[0]), initial=idle(traces[0].run) * float(traces[0].run.t[-1])))
     floor = floor_of(np.array([total]))
-    true = [true_impulse(trace, traces[0], summed[0]) for trace in traces]
+    true = [_true_impulse(trace, traces[0]) for trace in traces]
     for place, k in enumerate(shown):
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
@@ -203,25 +203,13 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
     return sheet.done()
 
 
-def true_impulse(trace: Trace, lead: Trace, whole: Floats) -> Floats | None:
-    """Cumulative impulse of the truth beside every sample of a run (n, nc); NaN where it is not known.
-
-    By the same rule over the same samples, so that the error of the rule cancels. A run whose collisions take no
-    time has too few samples for the forces of a truth whose collisions take some: there the truth's own count.
-
-    Args:
-        trace: the run, and the truth beside it.
-        lead: the truth by itself.
-        whole: its cumulative impulse.
-    """
+def _true_impulse(trace: Trace, lead: Trace) -> Floats | None:
+    """Cumulative impulse of the truth beside every sample of a run (n, nc); NaN where it is not known."""
     if trace.truth is None:
         return None
-    same = with_collisions(trace.truth, lead.run.events)
-    if any(event.impulse for event in trace.run.events) and not any(event.impulse for event in lead.run.events):
-        same = np.stack([np.interp(trace.run.t, lead.run.t, row) for row in whole.T], axis=1)
-        same[np.isnan(trace.truth.lam)] = np.nan
-    same[:, np.isnan(trace.truth.lam).all(axis=0)] = np.nan
-    return same
+    found = true_impulse(trace.run, trace.truth, lead.run)
+    found[np.isnan(trace.truth.lam)] = np.nan
+    return found
 
 
 def force_unit(traces: Sequence[Trace], k: int) -> str:

@@ -346,6 +346,21 @@ def test_a_release_that_is_late_has_the_impulse_of_that_time_and_not_of_half_a_s
     assert said == pytest.approx(abs(late) / 0.4, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_the_impulse_of_a_collision_in_no_time_is_held_against_that_of_one_that_takes_some(seed: int) -> None:
+    """However few samples such a run has: the truth's force does not act at any of them."""
+    rng, case = np.random.default_rng(seed), load("bouncing_ball", "elastic", t_end=1.0)
+    whole, impulse = pressed(0.6, 1e-3), float(rng.uniform(0.1, 0.8))
+    kept = np.searchsorted(whole.t, np.sort([0.0, *rng.uniform(0.0, 0.19, 3), 0.2, *rng.uniform(0.61, 1.0, 3)]))
+    (touch, _) = whole.events
+    run = replace(
+        whole, **{name: getattr(whole, name)[kept] for name in ("t", "q", "v", "gap", "energy", "mode")},
+        lam=np.zeros((len(kept), 1)), events=(replace(touch, impulse=impulse),),
+    )  # fmt: skip
+    said = measure("lam_impulse_path", case, from_run(whole, Tier.D, "made up"), run)
+    assert said == pytest.approx(abs(impulse - 0.4) / 0.4, rel=1e-9)
+
+
 @pytest.mark.parametrize("name", ["ball", "box", "springs"])
 def test_what_touches_is_known_without_modes(name: str) -> None:
     """Multipliers of a run that has none act where the truth's contacts are."""
