@@ -89,7 +89,7 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
     Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time
     included. Releases are matched too, as lam jumps there: a sample on the wrong side would count for half
-    its step. The truth's is `true_impulse`. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
+    its step. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
     known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
     many; N s where only the run's does.
     """
