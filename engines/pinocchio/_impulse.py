@@ -23,7 +23,7 @@ PUSH = 1  # the functions watched of a row that is free, and of one that is held
 SLOW = 1e-9  # part of the largest rate of a gap below which it stands still
 WEAK = 1e-7
 """Part of a gap's largest acceleration below which a row at rest is not pressed: an error may be."""
-TIES = 1e-12  # part of an approach within which two rows approach equally
+TIES = 1e-12  # part of an approach, or of an impulse, within which two rows approach, or push, equally
 PER_ROW = 1000  # impacts of one row at one instant that make a cycle
 
 
@@ -128,7 +128,8 @@ def sequential(at: Instant, a0: list[float], e: list[float]) -> bool:
         together = at.held  # the struck row is among them
         bounce = [0.0 if captured or j != i else e[i] for j in together]
         v, p = at.rows.strike(at.q, at.v, together, bounce)
-        pulling = [j for j, impulse in zip(together, p, strict=True) if impulse < 0.0 and at.modes[j] == CONTACT]
+        noise = TIES * float(np.abs(p).max())
+        pulling = [j for j, impulse in zip(together, p, strict=True) if impulse < -noise and at.modes[j] == CONTACT]
         if not pulling:
             break
         for j in pulling:

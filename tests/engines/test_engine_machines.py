@@ -160,6 +160,22 @@ def test_a_slow_strike_is_captured_and_a_pressed_row_is_held(rule: Any) -> None:
     np.testing.assert_allclose(settled.v, 0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("rule", [sequential, simultaneous])
+def test_what_is_caught_stays_and_what_is_not_comes_back(rule: Any) -> None:
+    """By Newton's law for each row alone: masses that nothing joins, pressed, at random speeds and restitutions."""
+    rng, n, a0, force = np.random.default_rng(4), 6, 1e4, 9.81
+    for _ in range(20):
+        masses, e, v = rng.uniform(0.1, 3.0, n), rng.uniform(0.2, 1.0, n), 10.0 ** rng.uniform(-3.0, 1.0, n)
+        its_law = law([a0] * n, [0.0] * n)
+        apart = rows(masses.tolist(), np.eye(n), np.zeros(n), its_law, (-force * masses).tolist()).rigid()
+        found = ImpulseMachine(apart, [a0] * n, e.tolist(), rule).settle(np.zeros(n), -v, (FREE,) * n)
+        caught = v < force / (np.sqrt(a0) * e**1.5)
+        assert [mode == CONTACT for mode in found.modes] == caught.tolist()
+        np.testing.assert_allclose(found.v, np.where(caught, 0.0, e * v), atol=1e-12)
+        given = {i: impulse for i, _, after, impulse in found.passed if after != COLLISION}
+        np.testing.assert_allclose([given[i] for i in range(n)], masses * (found.v + v), rtol=1e-9)
+
+
 def test_inputs_change_where_they_are_told_to() -> None:
     mass = rows([2.0], np.eye(1), np.array([10.0]), law([1e4], [0.0]), [0.0])
 
