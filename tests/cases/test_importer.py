@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from random_scenes import random_scene
+from random_scenes import random_scene, with_own_laws
 
+from crossbody.cases.files.case import overruled
 from crossbody.cases.files.mjcf import scene_of
 from crossbody.cases.scene import Scene
 from crossbody.engines.mujoco._build import compiled, spec_of
@@ -60,3 +61,14 @@ def told(scene: Scene) -> Scene:
 def test_a_scene_is_read_as_it_was_written(seed: int) -> None:
     scene = random_scene(seed)
     assert differences(told(scene_of(compiled(spec_of(scene), scene))), told(scene)) == []
+
+
+@pytest.mark.parametrize(("a0", "a1"), [(1e3, -1.0), (-1.0, 7.0), (1e3, 7.0), (0.0, 0.0), (-1.0, -1.0)])
+def test_constants_that_are_given_for_all_rows_change_nothing_else(a0: float, a1: float) -> None:
+    """Each by itself: one that is below 0 stays every row's own."""
+    own = with_own_laws(random_scene(3), 3)
+    found = overruled(own, a0, a1)
+    given = {name: value for name, value in (("a0", a0), ("a1", a1)) if value >= 0.0}
+    for group in ("joints", "pairs", "loops", "tendons"):
+        for one, other in zip(getattr(own, group), getattr(found, group), strict=True):
+            assert other == replace(one, law=replace(one.law, **given))

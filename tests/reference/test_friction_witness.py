@@ -7,7 +7,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import account, drawn, linear, piled, random_problem, rod_on_floor, run, tossed
+from friction_scenes import (
+    G,
+    account,
+    drawn,
+    linear,
+    piled,
+    point,
+    random_problem,
+    rod_on_floor,
+    run,
+    tossed,
+)
 
 from crossbody import cases, engines
 from crossbody.cases import Mode, Outcome, Tier, Trajectory
@@ -15,6 +26,7 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import PLACES
 from crossbody.reference import simulate
+from crossbody.reference.sundials.mode_problem import ModeProblem
 from crossbody.reports.judging.truth import truth_of
 
 QUICK = [
@@ -117,6 +129,21 @@ def test_both_decide_alike_where_one_set_agrees(seed: int) -> None:
             assert np.array_equal(one.mode[-1], other.mode[-1])
             compared += 1
     assert compared > 0
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_what_begins_to_slide_by_itself_is_found_without_a_search(space: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It goes where it is driven: a machine that guesses the other way finds its motion by its fallbacks alone."""
+    for fallback in ("_swept", "_searched"):
+        monkeypatch.setattr(ModeProblem, fallback, lambda *_: None)
+    rng = np.random.default_rng(6)
+    for _ in range(4):
+        mu, alpha = rng.uniform(0.05, 0.6), rng.choice([-1.0, 1.0]) * rng.uniform(0.7, 1.2)
+        n = 3 if space else 2
+        found = simulate(point(mu, alpha, space=space), np.zeros(n), np.zeros(n), 0.01, rtol=1e-9, solver="cvode")
+        assert found.outcome is Outcome.FINISHED, found.message
+        fall = np.sin(alpha) - np.sign(alpha) * mu * np.cos(alpha)
+        assert found.v[-1] == pytest.approx([0.01 * G * fall, *[0.0] * (n - 1)], rel=1e-8, abs=1e-10)
 
 
 def test_a_truth_without_a_closed_form_has_this_witness() -> None:

@@ -32,6 +32,20 @@ def test_feet_share_the_weight_of_what_rests(feet: np.ndarray, profile: str) -> 
     assert np.abs(rest.q - rest.q[0]).max() <= 1e-12
 
 
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
+def test_feet_that_are_uneven_by_less_than_the_tolerance_all_carry(rtol: float) -> None:
+    """Their laws then contradict each other by more than rounding, and by less than was asked for.
+
+    What each asks for beside the others, 0.4 rtol of the weight, four of them may lay on one, twice as it rebounds.
+    """
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        feet = SQUARE + np.outer(rng.uniform(-0.4, 0.4, 4) * rtol * WEIGHT / LAW.a0, [0.0, 0.0, 1.0])
+        found = resting.run(plate(feet, t_end=0.05), rtol=rtol)
+        assert found.counts["redundant"] == 1
+        assert found.lam[-1] == pytest.approx(np.full(4, WEIGHT / 4.0), rel=4.0 * 2.0 * 4.0 * 0.4 * rtol)
+
+
 @pytest.mark.parametrize("profile", ["compiled", "cvode"])
 def test_what_lands_flat_moves_as_on_one_contact(profile: str) -> None:
     """The law prescribes h'' of every foot alike: a slider with one contact does the same."""

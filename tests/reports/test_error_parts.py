@@ -22,7 +22,7 @@ from crossbody.engines.mujoco._build import MAX_IMPEDANCE, without_regularisatio
 from crossbody.reports import metrics
 from crossbody.reports.judging import comparison
 from crossbody.reports.judging.comparison import Entry, judged
-from crossbody.reports.judging.parts import Events, Positions, Split, Study, splits
+from crossbody.reports.judging.parts import Events, NotMeasuredError, Positions, Split, Study, observed, splits
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, from_run
@@ -115,6 +115,23 @@ def test_parts_are_those_that_a_run_was_made_of_and_add_up(case: Case, order: fl
     whole = next(row.value for row in judged(case, [Entry(engine="x", profile="", run=made.runs[0])], truth, "")
                  if row.metric == "position")  # fmt: skip
     assert sum(found.there.values()) == pytest.approx(whole, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_differences_of_which_some_are_no_power_of_the_step_tell_no_order(seed: int) -> None:
+    """However fast they fall: up to three tenths of them may be other than those of the next pair, times one factor."""
+    rng = np.random.default_rng(seed)
+    fall, last = rng.uniform(2.0, 16.0), rng.normal(size=(50, 2))
+    aside = rng.normal(size=last.shape)
+    aside -= last * np.sum(aside * last) / np.sum(last * last)
+    aside *= fall * np.linalg.norm(last) / np.linalg.norm(aside)
+    for other, told in ((0.2, True), (0.6, False), (3.0, False)):
+        errors = [fall * last + other * aside + last, last, np.zeros_like(last)]
+        if told:
+            assert observed(errors, STEPS)[0] == pytest.approx(fall, rel=1e-9)
+        else:
+            with pytest.raises(NotMeasuredError, match="No order"):
+                observed(errors, STEPS)
 
 
 def test_a_limit_is_known_to_what_it_is_off_by(case: Case) -> None:

@@ -361,6 +361,15 @@ def test_the_impulse_of_a_collision_in_no_time_is_held_against_that_of_one_that_
     assert said == pytest.approx(abs(impulse - 0.4) / 0.4, rel=1e-9)
 
 
+@pytest.mark.parametrize("after", [Mode.CONTACT, Mode.FREE])
+def test_a_gap_that_is_not_known_where_a_row_touches_or_lets_go_is_no_gap_of_zero(after: Mode) -> None:
+    case, run = load("bouncing_ball", "elastic", t_end=1.0), pressed(0.6, 1e-2)
+    (event,) = (event for event in run.events if event.after == after)
+    gap = np.where(np.abs(run.t - event.t)[:, None] < 1e-9, np.nan, run.gap)
+    blind = replace(run, gap=gap, events=(event,))
+    assert np.isnan(measure("event_gap", case, from_run(run, Tier.D, "made up"), blind) or 0.0)
+
+
 @pytest.mark.parametrize("name", ["ball", "box", "springs"])
 def test_what_touches_is_known_without_modes(name: str) -> None:
     """Multipliers of a run that has none act where the truth's contacts are."""
