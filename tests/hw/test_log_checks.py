@@ -217,6 +217,10 @@ def test_a_jump_counts_once_wherever_two_chunks_meet(kind: str, monkeypatch: pyt
         for cuts in ([], [row], [row - 1, row + 2]):
             check = blocks(smooth.JumpCheck("arm", "rad"), cuts, t, values)
             assert [(f.check, f.row, f.count) for f in check.findings()] == [(kind, row, 1)], (row, cuts)
+        if kind == "wraps":
+            straight, wraps = smooth.unwrapped(t, values)
+            assert wraps.tolist() == [row]
+            np.testing.assert_allclose(straight, smooth_motion, atol=1e-12)
 
 
 @pytest.mark.parametrize("rate", [np.pi / 180, 180 / np.pi, -1.0, 1e3, 0.0])
