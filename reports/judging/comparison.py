@@ -10,7 +10,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Claim, CrossbodyError, InvalidValue, Limit, Trajectory, UnknownName
+from crossbody.cases import Case, CaseUnsupported, Claim, CrossbodyError, InvalidValue, Limit, Trajectory, UnknownName
 from crossbody.cases.arguments import instance, shown
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
@@ -46,6 +46,7 @@ from crossbody.reports.judging.verdict import (
 )  # fmt: skip
 from crossbody.reports.measuring.alignment import instants
 from crossbody.reports.measuring.truth import TRUTH, Truth, before, shortened
+from crossbody.reports.runs import watch
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -450,10 +451,16 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict
         wanted = name in judge_.claims or judge_.limit(name) is not None
         if metric.CLAIMED and not wanted:
             continue
+        label = f"{judge_.case.label}: {name} of {judge_.entry.engine}:{judge_.entry.profile}"
+        watch.limited(label)
         try:
+            if why := watch.lost(label):
+                raise CaseUnsupported(why)
             found = _row(judge_, metric, name, wanted, truth, run)
         except (Exception, SystemExit) as error:
             found = judge_.row(name, math.nan, metric.UNIT, Word.CRASHED, crash(error))
+        finally:
+            watch.unlimited()
         if found is not None:
             yield found
 
