@@ -84,7 +84,7 @@ class Parameter:
         except (TypeError, ValueError, OverflowError):
             raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].") from None
         if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
-            raise InvalidValue(f"{where} is {number:g}; valid: {self.valid} {self.unit}.")
+            raise InvalidValue(f"{where} is {number:g}; valid: {f'{self.valid} {self.unit}'.rstrip()}.")
         if isinstance(self.default, int) and not isinstance(self.default, bool):
             if number != int(number):
                 raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")

@@ -68,8 +68,8 @@ def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Cas
     source = module(name)
     variant = next(iter(source.VARIANTS)) if variant is None else variant
     if not isinstance(variant, str) or variant not in source.VARIANTS:
-        raise UnknownName(f"variant of {Path(name).stem}", variant, source.VARIANTS)
-    label = f"{Path(name).stem}:{variant}"
+        raise UnknownName(f"variant of {_called(name)}", variant, source.VARIANTS)
+    label = f"{_called(name)}:{variant}"
     numbers = resolve(label, source.PARAMETERS, source.VARIANTS[variant], overrides)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
@@ -79,6 +79,11 @@ def build(name: str, variant: str | None, overrides: Mapping[str, Value]) -> Cas
         raise
     except (ArithmeticError, ValueError) as error:  # a root of what is below 0, a number beyond double precision
         raise SceneError(f"{label}: no scene has these parameters ({error}).") from error
+
+
+def _called(name: str) -> str:
+    """What a case is called: a robot's file with its ending, as its rows are labelled."""
+    return Path(name).name if name.endswith(ROBOT_FILES) else Path(name).stem
 
 
 def named(made: object, label: str, numbers: Mapping[str, Value]) -> Case:

@@ -443,6 +443,8 @@ class Actuator(_Named):
                 f"{what}: time_constant is {shown(self.time_constant)}; a filter alone has one, above 0 s."
             )
         object.__setattr__(self, "gear", _vector(f"{what}: gear", self.gear, np.size(self.gear)))
+        if not all(math.isfinite(gear * gear) for gear in self.gear):  # inertia at a joint goes by it
+            raise SceneError(f"{what}: gear is {shown(self.gear)}; valid: numbers whose squares are finite.")
         if self.tendon and self.armature:
             raise SceneError(
                 f"Actuator {self.name!r} has armature on a tendon, which would join branches in M: not done."

@@ -7,11 +7,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from numba.core import event, ir, types
+from numba.core import event, ir, transforms, types
+from numba.core.postproc import PostProcessor
 from numba.core.types.functions import BaseFunction
 
 _NUMBERS = (types.Integer, types.Float, types.Boolean)
 _resolve = BaseFunction.get_call_type
+_completed = PostProcessor.run
 _told, _listed = types.Record.__repr__, ir.Inst._rec_list_vars
 _WITHOUT_VARIABLES = frozenset({str, int, float, bool, type(None), ir.Loc})
 
@@ -22,7 +24,8 @@ def hastened() -> Iterator[None]:
 
     A compiler makes objects by the million that all live as long as it works. For a sum of two
     numbers numba tries forty signatures, before every pass it writes out all types of the
-    arguments, and each of its locks tells timers that nobody asks.
+    arguments, after half of them it finds anew how long each variable lives, and each of its locks
+    tells timers that nobody asks.
     """
     if BaseFunction.get_call_type is not _resolve:
         yield
@@ -30,12 +33,12 @@ def hastened() -> Iterator[None]:
     collects, tell = gc.isenabled(), event.broadcast
     gc.disable()
     BaseFunction.get_call_type, types.Record.__repr__ = _remembering(), _remembered_text()
-    ir.Inst._rec_list_vars, event.broadcast = _variables, _tell
+    ir.Inst._rec_list_vars, event.broadcast, PostProcessor.run = _variables, _tell, _complete
     try:
         yield
     finally:
         BaseFunction.get_call_type, types.Record.__repr__ = _resolve, _told
-        ir.Inst._rec_list_vars, event.broadcast = _listed, tell
+        ir.Inst._rec_list_vars, event.broadcast, PostProcessor.run = _listed, tell, _completed
         if collects:
             gc.enable()
 
@@ -55,6 +58,15 @@ def _variables(statement: ir.Inst, value: Any) -> list[ir.Var]:
         elif type(part) not in _WITHOUT_VARIABLES:
             found += _variables(statement, part)
     return found
+
+
+def _complete(after: PostProcessor, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """Put blocks in order after a pass, and find how long variables live only at first and where it is written down."""
+    code = after.func_ir
+    if emit_dels or code.is_generator or code.variable_lifetime is None:
+        _completed(after, emit_dels, extend_lifetimes)
+    else:
+        code.blocks = transforms.canonicalize_cfg(code.blocks)
 
 
 def _tell(told: event.Event) -> None:

@@ -24,7 +24,7 @@ import click
 from crossbody.cases import installed
 from crossbody.reports.commands import options
 from crossbody.reports.runs.watch import stopping
-from crossbody.reports.voice import as_json, folded, quiet, result, speaks
+from crossbody.reports.voice import as_json, folded, pure, quiet, result, speaks
 
 
 def _plug(context: click.Context, _: click.Parameter, given: tuple[str, ...]) -> None:
@@ -67,7 +67,7 @@ def list_(name: str | None, plain: bool) -> None:
     """
     from crossbody.reports import described
 
-    with redirect_stdout(sys.stderr) if plain else nullcontext():
+    with pure() if plain else nullcontext():
         told = described.everything() if name is None else described.one(name)
     click.echo(json.dumps({k.lower(): v for k, v in told.items()}, indent=1) if plain else described.text(told))
 
@@ -103,11 +103,12 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 def run(dry: bool, jobs: int, **asked: Any) -> int:
     """Run cases on engines, judge them, and write the report."""
     if dry:
-        words = ("names", "wanted", "variant", "pairs", "settings")
+        words = ("names", "wanted", "variant", "pairs", "rtol", "settings", "out", "against", "others", "limit")
         return _do("planned.tell", **{name: asked[name] for name in words})
     from crossbody.reports.runs import choice  # wrong words are told before all else is imported
 
-    cases = choice.load_cases(asked["names"], asked.pop("variant"), choice.parse_settings(asked["pairs"]))
+    given = choice.parse_settings(asked["pairs"])
+    cases = choice.load_cases(asked["names"], asked.pop("variant"), given, asked["limit"])
     return _do("run.run", cases, **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
+import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, redirect_stdout
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 
 _Work = TypeVar("_Work", bound=Callable[..., int])
 _KEY = "crossbody.voice"
-QUIET, JSON, OUT = "quiet", "json", "out"
+QUIET, JSON, OUT, PLACE = "quiet", "json", "out", "place"
 
 
 def speaks(command: _Work) -> _Work:
@@ -30,9 +32,10 @@ def speaks(command: _Work) -> _Work:
     def spoken(*args: Any, quiet: bool, as_json: bool, **more: Any) -> int:
         click.get_current_context().meta[_KEY] = {QUIET: quiet, JSON: as_json, OUT: sys.stdout}
         with (
-            redirect_stdout(sys.stderr) if as_json else nullcontext(),  # what code of a user's own may print
+            pure() if as_json else nullcontext() as own,
             count.shown(nothing) if silent() else nullcontext(),
         ):
+            click.get_current_context().meta[_KEY][PLACE] = own
             return command(*args, **more)
 
     options = (
@@ -46,6 +49,43 @@ def speaks(command: _Work) -> _Work:
     return speaking
 
 
+@contextmanager
+def pure() -> Iterator[int | None]:
+    """Let what a user's code, or compiled code of an engine, prints go to stderr: stdout has the result alone.
+
+    Yields:
+        A descriptor of stdout; None where there is none.
+    """
+    with redirect_stdout(sys.stderr), _as_stdout(2) as own:
+        yield own
+
+
+@contextmanager
+def _as_stdout(other: int) -> Iterator[int | None]:
+    """Write to a descriptor what is written to 1, and yield another one for what was 1; None if one of them is closed.
+
+    What C has printed and not yet written goes where it was printed to.
+    """
+    try:
+        own = os.dup(1)
+        _flush()
+        os.dup2(other, 1)
+    except OSError:
+        yield None
+        return
+    try:
+        yield own
+    finally:
+        _flush()
+        os.dup2(own, 1)
+        os.close(own)
+
+
+def _flush() -> None:
+    with suppress(AttributeError, OSError, TypeError):  # not a POSIX system
+        ctypes.CDLL(None).fflush(None)
+
+
 def _told() -> Mapping[str, Any]:
     context = click.get_current_context(silent=True)
     return {} if context is None else context.meta.get(_KEY, {})
@@ -57,7 +97,9 @@ def _asked(word: str) -> bool:
 
 def result(text: str) -> None:
     """Print the result of a command that prints nothing else."""
-    print(text, file=_told().get(OUT, sys.stdout), flush=True)
+    own = _told().get(PLACE)
+    with nullcontext() if own is None else _as_stdout(own):
+        print(text, file=_told().get(OUT, sys.stdout), flush=True)
 
 
 def quiet() -> bool:

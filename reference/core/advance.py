@@ -165,6 +165,27 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     K.gaps(s.t, w.y[:nq], w.y[nq:], m.p, w.gap, w.rate)
     if not (s.frictional and events.pulling(s, m, w, b.mode) >= 0):
         record.here(K, s, m, w, b.mode, b.out, b.modes, False)
+    code = instant.ask(instant.FIRE, K, s, m, w, b)
+    if code != 0:
+        return int(code)
+    code = _restart(K, s, m, w, b)
+    jam, s.jam = s.jam, 0
+    if jam and code == NO_CONSISTENT_MODES:
+        return PAINLEVE
+    if s.frictional and code == MODE_CYCLE and instant.ask(instant.ALL_JAM, K, s, m, w, b) != 0:
+        return PAINLEVE
+    if jam and code == 0 and not s.indeterminate:  # other modes go on from there, and no law says which
+        s.indeterminate, s.determined_until = 1, s.t
+    if code == 0 and s.audited:
+        code = audit.account(K, s, m, w)
+    if code == 0:
+        record.here(K, s, m, w, b.mode, b.out, b.modes, s.audited)
+    return int(code)
+
+
+@compiled
+def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Apply the transitions that fired at the step's end; a code where nothing can follow from them."""
     journal.remember(s, b)
     moved, touched, stopped, drifts, caught = False, False, False, False, False
     s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
@@ -192,24 +213,14 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             journal.move(s, b, i, active_mode(s, m, w, i))
     if moved and journal.remember(s, b):
         if s.one_by_one:
-            return PAINLEVE if s.frictional and _all_jam(K, s, m, w, b) else MODE_CYCLE
+            return PAINLEVE if s.frictional and all_jam(K, s, m, w, b) else MODE_CYCLE
         s.one_by_one, s.history = 1, 0
     for i in range(s.ng):
         if w.guard_hit[i] <= s.theta:
             s.jumps = 1
             if settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
                 return LOST
-    code = _restart(K, s, m, w, b)
-    jam, s.jam = s.jam, 0
-    if (jam and code == NO_CONSISTENT_MODES) or (s.frictional and code == MODE_CYCLE and _all_jam(K, s, m, w, b)):
-        return PAINLEVE
-    if jam and code == 0 and not s.indeterminate:  # other modes go on from there, and no law says which
-        s.indeterminate, s.determined_until = 1, s.t
-    if code == 0 and s.audited:
-        code = audit.account(K, s, m, w)
-    if code == 0:
-        record.here(K, s, m, w, b.mode, b.out, b.modes, s.audited)
-    return int(code)
+    return 0
 
 
 @compiled
@@ -237,18 +248,18 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 
 @compiled
-def _all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+def all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Whether contacts that let go in turn would jam, or nearly, if all pressed that close; it marks these."""
     for i in range(s.nc):
         closes = has_friction(m, i) and b.mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
         if closes and not is_dry(m, i):
             b.mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, b.mode)
-    return bool(_jams(K, s, m, w, b, JAMMING))
+    return bool(jams(K, s, m, w, b, JAMMING))
 
 
 @compiled
-def _jams(K: Any, s: Any, m: Model, w: Work, b: Buffers, near: float) -> bool:
+def jams(K: Any, s: Any, m: Model, w: Work, b: Buffers, near: float) -> bool:
     """Whether contacts that slide jam, or come as `near` to it; it marks these, and leaves other marks where none does.
 
     Before they jam their forces grow without bound, so that no step is short enough, unless what drives them vanishes
@@ -268,7 +279,7 @@ def _jams(K: Any, s: Any, m: Model, w: Work, b: Buffers, near: float) -> bool:
 @compiled
 def _stuck(K: Any, s: Any, m: Model, w: Work, b: Buffers, code: int) -> int:
     """Why time does not go on: contacts are about to jam, or what a step found."""
-    return int(PAINLEVE if s.frictional and _jams(K, s, m, w, b, JAMMING) else code)
+    return int(PAINLEVE if s.frictional and instant.ask(instant.JAM, K, s, m, w, b) != 0 else code)
 
 
 @compiled

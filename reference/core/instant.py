@@ -1,7 +1,7 @@
 """What is done at an instant where modes may change: code of its own, called at its address.
 
-The iteration over modes and the sharing of loads (`settle`) are a third of the code of the loop, which asks for them
-once an event. Compiled on their own they are compiled beside it.
+The transitions that fire, the iteration over modes and the sharing of loads (`settle`) are a third of the code of the
+loop, which asks for them once an event. Compiled on their own they are compiled beside it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.apart import count_at
 from crossbody.reference.core.layout import Buffers, Model, Work
 
-SETTLE, SHARE = np.arange(2)
+FIRE, SETTLE, SHARE, JAM, ALL_JAM = np.arange(5)
 
 
 @compiled

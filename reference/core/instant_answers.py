@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.core.instant import SETTLE
+from crossbody.reference.core.advance import JAMMING, all_jam, fire, jams
+from crossbody.reference.core.instant import FIRE, JAM, SETTLE, SHARE
 from crossbody.reference.core.layout import Buffers, Model, Work
 from crossbody.reference.core.settle import settle, share
 
@@ -12,7 +13,16 @@ from crossbody.reference.core.settle import settle, share
 def answer(what: int, K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Do what is asked, and return its code.
 
-    SETTLE  modes and discrete variables iterate until they agree
-    SHARE   rows in contact share what they carry
+    FIRE     what fired at a step's end changes modes and discrete variables
+    SETTLE   these iterate until they agree
+    SHARE    rows in contact share what they carry
+    JAM      1 where contacts that slide jam, or nearly
+    ALL_JAM  1 where contacts that let go in turn would jam, or nearly, if all pressed that close
     """
-    return int(settle(K, s, m, w, b)) if what == SETTLE else int(share(K, s, m, w, b))
+    if what == FIRE:
+        return int(fire(K, s, m, w, b))
+    if what == SETTLE:
+        return int(settle(K, s, m, w, b))
+    if what == SHARE:
+        return int(share(K, s, m, w, b))
+    return int(jams(K, s, m, w, b, JAMMING) if what == JAM else all_jam(K, s, m, w, b))

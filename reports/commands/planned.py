@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
@@ -11,29 +12,50 @@ from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Value
 from crossbody.reports import layout
 from crossbody.reports.judging.stored import words
-from crossbody.reports.runs import choice
+from crossbody.reports.pages import results
+from crossbody.reports.runs import choice, output
+
+
+def checked(
+    wanted: Sequence[str], rtol: float | None, settings: Sequence[str],
+    out: Path, against: Path | None, others: Sequence[Path],
+) -> tuple[tuple[choice.Pick, ...], dict[str, Value]]:  # fmt: skip
+    """Check all that can be before anything is run; the engines asked for, and their settings."""
+    choice.check_tolerance(rtol)
+    picks, asked = choice.picks(wanted), choice.parse_settings(settings, "--set-engine")
+    choice.check_asked(asked, picks)
+    output.check(out, "run")
+    results.check(against, others)
+    return picks, asked
 
 
 def tell(
-    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], settings: Sequence[str]
-) -> int:
+    names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], rtol: float | None,
+    settings: Sequence[str], out: Path, against: Path | None, others: Sequence[Path], limit: float,
+) -> int:  # fmt: skip
     """Print what `run` would do with the same words; the exit code."""
-    cases = choice.load_cases(names, variant, choice.parse_settings(pairs))
-    picks, asked = choice.picks(wanted), choice.parse_settings(settings, "--set-engine")
-    choice.check_asked(asked, picks)
-    for case in cases:
+    cases = choice.load_cases(names, variant, choice.parse_settings(pairs), limit)
+    picks, asked = checked(wanted, rtol, settings, out, against, others)
+    found = [(case, _planned(case, picks, asked, rtol)) for case in cases]
+    for case, known in found:
         parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
         click.echo(f"{case.label}: {len(case.v0)} velocities, {len(case.contacts)} rows, {case.t_end:g} s")
         click.echo(layout.told(f"  parameters: {parameters}") if parameters else "  no parameters")
-        known: list[tuple[str, str, Mapping[str, Any]]] = []
-        for pick in (choice.of_case(one, case) for one in picks):
-            told = _settings(case, pick, asked)
-            if not isinstance(told, str):
-                known.append((pick.engine, pick.profile, told))
-            line = f"  {pick.engine}:{pick.profile}  {told if isinstance(told, str) else words(told)}"
+        for engine, profile, told in known:
+            line = f"  {engine}:{profile}  {told if isinstance(told, str) else words(told)}"
             click.echo(layout.told(line.rstrip()))
-        choice.check_known(asked, known)
     return 0
+
+
+def _planned(
+    case: Case, picks: Sequence[choice.Pick], asked: Mapping[str, Value], rtol: float | None
+) -> list[tuple[str, str, Mapping[str, Any] | str]]:
+    """Return each engine and profile with its settings, or with why it would not run."""
+    given = dict(asked) | ({} if rtol is None else {"rtol": rtol})
+    own = [choice.of_case(pick, case) for pick in picks]
+    found = [(pick.engine, pick.profile, _settings(case, pick, given)) for pick in own]
+    choice.check_known(asked, [(who, how, told) for who, how, told in found if not isinstance(told, str)])
+    return found
 
 
 def _plain(value: Value) -> str:

@@ -10,10 +10,11 @@ from time import perf_counter
 
 import click
 
-from crossbody.cases import Case, InvalidValue, installed
+from crossbody.cases import Case, installed
 from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reference.compiling import count
 from crossbody.reports import voice
+from crossbody.reports.commands import planned
 from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging.audit import SEED
@@ -21,7 +22,7 @@ from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Row, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results
-from crossbody.reports.runs import choice, files, jobs, output, store, study, watch
+from crossbody.reports.runs import files, jobs, output, store, study, watch
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -42,14 +43,9 @@ def run(
     regression band; `at_once` is how many cases are run at once, in processes of their own;
     `budget` is how long the tightest run of a scene may take, s.
     """
-    if rtol is not None and not 1e-14 <= rtol <= 1e-1:
-        raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
+    picks, asked = planned.checked(wanted, rtol, settings, out, against, others)
     for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
         click.echo(voice.folded(f"note: {sentence}"), err=True)
-    picks, asked = choice.picks(wanted), choice.parse_settings(settings, "--set-engine")
-    choice.check_asked(asked, picks)
-    output.check(out, "run")
-    results.check(against, others)
     told = provenance(command, rtol=rtol, seed=SEED)
     clock, compiled = [perf_counter()], count.seconds
     decides = identity("run", cases, names, picks=picks, rtol=rtol, settings=asked, budget=budget)
@@ -113,8 +109,14 @@ def _beside(cases: Sequence[Case], parts: Parts, do: Callable[[int], int], at_on
     missing = sorted(_missing(cases, parts), key=lambda i: -len(cases[i].q0) - len(cases[i].contacts))
     if min(at_once, len(missing)) < 2:
         return 0
+    parts.begin()  # for all of them
     with progress(len(missing)) as tell:
-        return min(watch.beside([partial(do, i) for i in missing], at_once, lambda k: tell(cases[missing[k]].label)), 1)
+
+        def told(k: int) -> None:
+            parts.keep()
+            tell(cases[missing[k]].label)
+
+        return min(watch.beside([partial(do, i) for i in missing], at_once, told), 1)
 
 
 def findings(case: Case) -> tuple[str, ...]:

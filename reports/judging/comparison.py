@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import traceback
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Claim, CrossbodyError, InvalidValue, Limit, Trajectory, UnknownName
+from crossbody.cases import Case, CaseUnsupported, Claim, CrossbodyError, InvalidValue, Limit, Trajectory, UnknownName
 from crossbody.cases.arguments import instance, shown
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
@@ -145,12 +145,22 @@ def compare(
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def judged(case: Case, entries: Sequence[Entry], truth: Truth, command: str) -> list[Verdict]:
-    """Every row of one case: of every run, the truth's own, and a word on claims that judged nothing."""
+def unguarded(_label: str) -> str:
+    """Let a metric take as long as it likes."""
+    return ""
+
+
+def judged(
+    case: Case, entries: Sequence[Entry], truth: Truth, command: str, begin: Callable[[str], str] = unguarded
+) -> list[Verdict]:
+    """Every row of one case: of every run, the truth's own, and a word on claims that judged nothing.
+
+    `begin` is told what each metric is before it is measured, and returns why it is not to be; nothing if it is.
+    """
     check_names(case)
     truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
     trusted = shortened(truth)
-    rows = [row for entry in entries for row in verdicts(case, entry, trusted, command)]
+    rows = [row for entry in entries for row in verdicts(case, entry, trusted, command, begin)]
     return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command)]
 
 
@@ -253,7 +263,10 @@ def longer(case: Case) -> float:
 class _Judge:
     """Fills in what all rows of one run share."""
 
-    def __init__(self, case: Case, entry: Entry, truth: Truth, command: str) -> None:
+    def __init__(
+        self, case: Case, entry: Entry, truth: Truth, command: str, begin: Callable[[str], str] = unguarded
+    ) -> None:
+        self.begin = begin
         self.case, self.entry, self.truth = case, entry, truth
         self.claims: Mapping[str, Claim] = {claim.metric: claim for claim in case.claims}
         self.limits = limits_of(case)
@@ -346,10 +359,12 @@ class _Judge:
         )  # fmt: skip
 
 
-def verdicts(case: Case, entry: Entry, truth: Truth, command: str) -> list[Verdict]:
+def verdicts(
+    case: Case, entry: Entry, truth: Truth, command: str, begin: Callable[[str], str] = unguarded
+) -> list[Verdict]:
     """Every row of one run, which is compared as far as the truth is trusted."""
     truth = shortened(truth)
-    judge_ = _Judge(case, entry, truth, command)
+    judge_ = _Judge(case, entry, truth, command, begin)
     if entry.crashed:
         return [judge_.row("run", math.nan, "", Word.CRASHED, entry.crashed)]
     if entry.run is None:
@@ -450,7 +465,10 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict
         wanted = name in judge_.claims or judge_.limit(name) is not None
         if metric.CLAIMED and not wanted:
             continue
+        label = f"{judge_.case.label}: {name} of {judge_.entry.engine}:{judge_.entry.profile}"
         try:
+            if why := judge_.begin(label):
+                raise CaseUnsupported(why)
             found = _row(judge_, metric, name, wanted, truth, run)
         except (Exception, SystemExit) as error:
             found = judge_.row(name, math.nan, metric.UNIT, Word.CRASHED, crash(error))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from crossbody import cases, engines
-from crossbody.cases import Case, EngineUnavailable, InvalidValue, UnknownName, Value
+from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, UnknownName, Value
+from crossbody.reports.runs import watch
 
 DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
@@ -54,12 +55,23 @@ def parse_settings(pairs: Sequence[str], option: str = "--set") -> dict[str, Val
     return found
 
 
-def load_cases(names: Sequence[str], variant: str | None, overrides: Mapping[str, Value]) -> tuple[Case, ...]:
-    """Every case asked for, in all its variants unless one is named."""
+def load_cases(
+    names: Sequence[str], variant: str | None, overrides: Mapping[str, Value], limit: float = watch.LIMIT
+) -> tuple[Case, ...]:
+    """Every case asked for, in all its variants unless one is named.
+
+    Raises:
+        CaseUnsupported: for one that was not built within the limit, s.
+    """
     found = []
     for name in names or DEFAULT_CASES:
+        label = f"{name} (build)"
+        if why := watch.lost(label):
+            raise CaseUnsupported(f"{name} cannot be built. {why}")
+        watch.limited(label, limit)
         chosen = (variant,) if variant is not None else cases.variants(name)
         found += [cases.load(name, each, **overrides) for each in chosen]
+    watch.unlimited()
     return tuple(found)
 
 
@@ -100,6 +112,12 @@ def of_pick(settings: Mapping[str, Value], pick: Pick) -> dict[str, Value]:
     for who in (pick.engine, f"{pick.engine}:{pick.profile}"):
         found |= {name.removeprefix(f"{who}."): value for name, value in settings.items() if name.startswith(f"{who}.")}
     return found
+
+
+def check_tolerance(rtol: float | None) -> None:
+    """Check the tolerance that all engines are given."""
+    if rtol is not None and not 1e-14 <= rtol <= 1e-1:
+        raise InvalidValue(f"--rtol is {rtol:g}; valid: [1e-14, 0.1].")
 
 
 def check_known(settings: Mapping[str, Value], ran: Sequence[tuple[str, str, Mapping[str, Any]]]) -> None:

@@ -26,7 +26,7 @@ ABOUT = "command.json"
 
 
 class Parts:
-    """The parts of one command in its output folder; the folder is made for them.
+    """The parts of one command in its output folder; the folder is made with the first of them.
 
     Args:
         out: the output folder, as `output.check` lets it pass.
@@ -42,6 +42,18 @@ class Parts:
         self.out, self.path = out.absolute(), out.absolute() / f"{PARTS}{digest}"
         self.command, self.lock = command, -1
         self.first = output.first_missing(self.out)
+        if self.path.exists():
+            self.begin()
+        self._tell()
+
+    def begin(self) -> None:
+        """Make the folder, which this process alone writes from now on.
+
+        Raises:
+            OutputError: if the disk refuses, or another process is running the same command here.
+        """
+        if self.lock >= 0:
+            return
         try:
             self._open()
         except OutputError:
@@ -49,7 +61,7 @@ class Parts:
         except OSError as error:
             if self.lock >= 0:
                 self.__exit__(OutputError)
-            raise OutputError(f"Output folder {out} cannot be written: {error.strerror or error}.") from None
+            raise OutputError(f"Output folder {self.out} cannot be written: {error.strerror or error}.") from None
 
     def _open(self) -> None:
         self.out.mkdir(parents=True, exist_ok=True)
@@ -63,8 +75,11 @@ class Parts:
             if name.startswith("."):
                 shutil.rmtree(self.path / name, ignore_errors=True)
         manifest.replace_text(self.path / ABOUT, json.dumps({"command": self.command}))
-        watch.resumable(f"Nothing was replaced; {self._kept()}")
-        self._tell()
+
+    def keep(self) -> None:
+        """Say what an interrupt leaves, once something is complete."""
+        if self.found:
+            watch.resumable(f"Nothing was replaced; {self._kept()}")
 
     @property
     def found(self) -> int:
@@ -76,11 +91,12 @@ class Parts:
 
     def _tell(self) -> None:
         """Say what is there already, of this command and of others."""
+        self.keep()
         if self.found:
             voice.note(
                 f"{self.found} parts of an interrupted run of this command are in {self.out}: it continues with them."
             )
-        for name in files.listed(self.out):
+        for name in files.listed(self.out) if self.out.is_dir() else ():
             if name.startswith(PARTS) and name != self.path.name and not (self.out / name).is_symlink():
                 _offer(self.out / name)
 
@@ -96,12 +112,14 @@ class Parts:
     @contextmanager
     def put(self, key: str) -> Iterator[Path]:
         """Write a part into a folder that counts when all is written."""
+        self.begin()
         made = Path(tempfile.mkdtemp(prefix=".", dir=self.path))
         try:
             yield made
             if watch.stopping():  # a library may have swallowed it, and done less than it should
                 raise watch.Stopped
             os.rename(made, self.part(key))
+            self.keep()
         except OSError as error:
             raise OutputError(f"{made} cannot be written: {error.strerror or error}.") from error
         finally:
@@ -117,7 +135,8 @@ class Parts:
             output.take_away(self.out, self.first)
         elif issubclass(kind, OutputError):
             voice.note(self._kept())
-        os.close(self.lock)
+        if self.lock >= 0:
+            os.close(self.lock)
 
 
 def _offer(left: Path) -> None:

@@ -23,7 +23,7 @@ from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import TRUTH, Truth
 from crossbody.reports.metrics.position import scale_of
-from crossbody.reports.runs import files
+from crossbody.reports.runs import files, watch
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, as_plain, save
 from crossbody.reports.runs.thin import keep
@@ -42,11 +42,20 @@ _ARROW = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
 
 def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> list[Row]:
     """Verdicts of all cases; `commands` names what reproduces each case (by its label)."""
-    return [
-        row.row()
-        for result in results
-        for row in judged(result.case, result.entries, result.truth, commands[result.case.label])
-    ]
+    try:
+        return [
+            row.row()
+            for result in results
+            for row in judged(result.case, result.entries, result.truth, commands[result.case.label], _begun)
+        ]
+    finally:
+        watch.unlimited()
+
+
+def _begun(label: str) -> str:
+    """Let a metric take as long as an engine; why it is not to be begun again, if it did not come back."""
+    watch.limited(label)
+    return watch.lost(label)
 
 
 def write(out: Path, results: Sequence[CaseResult], rows: Sequence[Row], provenance: Mapping[str, Any]) -> None:

@@ -65,9 +65,15 @@ _stopping = False
 _lost: dict[str, str] = {}
 
 
-def limited(label: str, seconds: float = LIMIT) -> None:
-    """Say what is run from now on and how long it may take, s; it alone is lost if it hangs or crashes."""
+def limited(label: str, seconds: float | None = None) -> None:
+    """Say what is run from now on; it alone is lost if it hangs or crashes.
+
+    Args:
+        label: what.
+        seconds: how long it may take, s; as long as what was run before it if not given.
+    """
     if _diary is not None:
+        seconds = float(str(_diary.read().get("seconds", LIMIT))) if seconds is None else seconds
         _diary.write(label=label, until=time.monotonic() + seconds, seconds=seconds)
 
 

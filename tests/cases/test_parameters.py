@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from crossbody import cases
-from crossbody.cases import InvalidValue, UnknownName
+from crossbody.cases import InvalidValue, Parameter, UnknownName
 from crossbody.cases.parameters import NumberOrWord, Numbers, spread
 from crossbody.reports.runs.choice import load_cases, parse_settings
 
@@ -89,3 +89,10 @@ def test_so_are_a_robots_file_and_its_keyframe(tmp_path: Path) -> None:
     assert len(load_cases([str(path)], None, {})) > 1
     with pytest.raises(UnknownName, match="nope"):
         cases.load(f"{path}:nope")
+
+
+@pytest.mark.parametrize(("unit", "told"), [("", "(0, inf)."), ("kg", "(0, inf) kg.")])
+def test_what_is_valid_has_its_unit_and_no_space_without(unit: str, told: str) -> None:
+    with pytest.raises(InvalidValue) as error:
+        Parameter(default=1.0, unit=unit, low=0.0, open_low=True).checked("mu", -1.0)
+    assert str(error.value) == f"mu is -1; valid: {told}"

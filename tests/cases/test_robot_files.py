@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import random
+import re
+import xml.etree.ElementTree as ET
 import zipfile
 from contextlib import suppress
 from pathlib import Path
@@ -20,10 +22,11 @@ from places import ROBOTS
 from published import SAME, STATES, dynamics_of, moves_as_in_mujoco
 
 from crossbody import cases, engines
-from crossbody.cases import InvalidValue, Outcome, SceneError, UnknownName
+from crossbody.cases import CrossbodyError, InvalidValue, Outcome, SceneError, UnknownName
 from crossbody.cases.files.mjcf import scene_of
 from crossbody.cases.files.reading import model_of
 from crossbody.cases.files.reading import scene_of as scene_of_file
+from crossbody.cases.scene import Actuator
 from crossbody.reference import System, simulate
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
@@ -992,3 +995,45 @@ def test_a_bound_of_a_urdf_that_is_left_out_is_0(bounds: str, wanted: tuple[floa
     scene = cases.from_file(path).scene
     assert scene is not None
     assert scene.joints[0].range == pytest.approx(wanted)
+
+
+EVERYTHING = """
+<mujoco><option gravity="0 0 -9.81"/><worldbody><geom type="plane" size="1 1 1"/><body name="arm" pos="0 0 1">
+<joint name="shoulder" axis="0 1 0" range="-1 1" limited="true" damping="1" stiffness="2" armature=".1" springref=".1"/>
+<inertial pos="0 0 .5" mass="1" diaginertia=".1 .1 .01"/><geom type="capsule" size=".1 .2" pos="0 0 .3" friction="1"/>
+<body name="two" pos="0 0 .5"><joint name="elbow" axis="0 1 0"/><geom type="box" size=".1 .1 .2" mass="1"/></body>
+</body></worldbody><tendon><fixed name="rope" range="-1 1" limited="true"><joint joint="shoulder" coef="1"/>
+<joint joint="elbow" coef="2"/></fixed></tendon><actuator><motor joint="shoulder" gear="2"/>
+<general joint="elbow" gainprm="1 2 3" biasprm="1 2 3" gear="1" armature="1" damping="1"/>
+<position tendon="rope" kp="30" kv="2" gear="1.5" forcerange="-20 20"/></actuator>
+<keyframe><key name="home" qpos=".1 .2" qvel="1 2" ctrl="1 2 3"/></keyframe></mujoco>
+"""
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("number", ["1e308", "-1e308", "1e155", "1e-308", "5e-324"])
+def test_a_number_at_an_end_of_double_precision_is_read_or_refused_in_a_sentence(number: str, tmp_path: Path) -> None:
+    """Each attribute of a file in turn: what is made of it, or its square, may have no such number."""
+    path, whole = tmp_path / "far.xml", list(ET.fromstring(EVERYTHING).iter())
+    found = [(i, name) for i, one in enumerate(whole) for name, text in one.items() if re.fullmatch(r"[-\d. ]+", text)]
+    assert len(found) > 30
+    for i, name in found:
+        root = ET.fromstring(EVERYTHING)
+        element = list(root.iter())[i]
+        element.set(name, " ".join([*element.get(name, "").split()[:-1], number]))
+        path.write_text(ET.tostring(root, encoding="unicode"))
+        with suppress(CrossbodyError):
+            engines.load("reference").prepare(cases.load(str(path), t_end=0.01))
+
+
+def test_a_gear_without_a_square_is_told_by_its_actuator() -> None:
+    with pytest.raises(SceneError, match=r"^Actuator 'm': gear is \(1e\+308,\); valid: numbers whose squares are fin"):
+        Actuator(name="m", joint="j", gear=(1e308,))
+
+
+def test_a_parameter_of_a_file_is_told_with_the_files_name(tmp_path: Path) -> None:
+    name = write(tmp_path)
+    with pytest.raises(InvalidValue, match=r"^arm\.xml:raised: t_end is -1; valid: \(0, inf\) s\.$"):
+        cases.load(name, "raised", t_end=-1.0)
+    with pytest.raises(UnknownName, match=r"variant of arm\.xml"):
+        cases.load(name, "none")

@@ -225,9 +225,12 @@ def test_a_run_may_take_the_seconds_that_are_asked_for_and_a_truth_three_times_t
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     given: dict[str, float] = {}
-    monkeypatch.setattr(watch, "limited", lambda label, seconds: given.update({label: seconds}))
+    monkeypatch.setattr(watch, "limited", lambda label, seconds=None: given.update({label: seconds}))
     assert call("run", *LIMITED) == 0
-    assert given == {"bouncing_ball:linear: truth": 210.0, "bouncing_ball:linear: fake:exact": 70.0}
+    timed = {label: seconds for label, seconds in given.items() if seconds is not None}
+    runs = {"bouncing_ball:linear: truth": 210.0, "bouncing_ball:linear: fake:exact": 70.0}
+    assert timed == runs | {"bouncing_ball (build)": 70.0}
+    assert {label.split(" of ")[1] for label in given.keys() - timed} == {"fake:exact"}  # metrics: as their run
 
 
 def test_a_benchmark_may_take_the_seconds_and_minutes_that_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -294,6 +297,45 @@ def test_a_plan_counts_velocities_where_a_quaternion_has_more_positions(capsys: 
 
 @pytest.mark.parametrize("dry", [(), ("--dry-run",)])
 @pytest.mark.parametrize("setting", [".dt=3", "fake.=3", "fake.nonsense=1", "nonsense=1"])
-def test_a_setting_that_nobody_has_is_wrong_in_a_plan_too(setting: str, dry: tuple[str, ...]) -> None:
+def test_a_setting_that_nobody_has_is_wrong_in_a_plan_too(
+    setting: str, dry: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
     assert call(*LINEAR, "-e", "fake:exact", "--set-engine", setting, *dry) == 2
     assert not Path("out").exists()
+    assert capsys.readouterr().out == ""
+
+
+WRONG = {
+    "no tolerance": ("--rtol", "0"), "none either": ("--rtol", "nan"), "no folder": ("--out", "/proc/x"),
+    "a file": ("--out", "mine"), "another's": ("--out", "."), "nothing to compare with": ("--against", "nowhere"),
+    "no study": ("--with", "nowhere"), "no parameter": ("--set", "t_end=-1"), "no number": ("--set-engine", "fake.dt"),
+    "no engine": ("-e", "none"), "no variant": ("--variant", "none"), "no time": ("--time-limit", "0"),
+    "no setting": ("--set-engine", "fake.nonsense=1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", WRONG.values(), ids=WRONG)
+def test_what_a_run_refuses_before_it_begins_a_plan_refuses_with_the_same_words(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("mine").touch()
+    said = []
+    for dry in ((), ("--dry-run",)):
+        assert call(*LINEAR, "-e", "fake:exact", *words, *dry) == 2
+        told = capsys.readouterr()
+        assert told.out == ""
+        said.append(told.err)
+    assert said[0] == said[1]
+    assert [path.name for path in Path.cwd().iterdir()] == ["mine"]
+
+
+def test_a_plan_shows_the_tolerance_that_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def planned(_: object, case: Case, profile: str, **asked: Any) -> Mapping[str, Any]:
+        return {"rtol": 1e-9} | asked
+
+    monkeypatch.setattr(FakeEngine, "planned", planned)
+    for words in (("--rtol", "1e-5"), ("--set-engine", "rtol=1e-5")):
+        assert call(*LINEAR, "-e", "fake:exact", *words, "--dry-run") == 0
+        assert "fake:exact  rtol=1e-05" in capsys.readouterr().out

@@ -261,13 +261,66 @@ def test_an_interrupt_that_is_swallowed_stops_all_the_same(place: str, capfd: py
 
 
 def test_compiled_code_that_never_comes_back_is_stopped(tmp_path: Path) -> None:
+    """And nothing is said to be kept, nor left, where nothing was complete."""
     process = begun("run", "balls.py", "--variant", "linear", "-e", "fake:stuck", cwd=tmp_path)
-    wait_for(tmp_path, "out/.crossbody-parts.*", process)
-    time.sleep(1.0)
+    wait_for(tmp_path, "stuck", process)
     code, said = interrupted(process)
     assert code == 130
-    assert "interrupted" in said
-    assert not (tmp_path / "out" / "index.html").exists()
+    assert said.splitlines()[-1] == "crossbody: interrupted. Nothing was replaced."
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_killed_before_anything_is_complete_leaves_nothing(tmp_path: Path) -> None:
+    process = begun("run", "balls.py", "--variant", "linear", "-e", "fake:stuck", "--out", "a/b", cwd=tmp_path)
+    wait_for(tmp_path, "stuck", process)
+    process.kill()
+    process.communicate(timeout=20)
+    assert {path.name for path in tmp_path.iterdir()} <= {"balls.py", "stuck", "__pycache__"}
+
+
+HANGS = """import ctypes
+from dataclasses import replace
+
+from crossbody import cases
+from crossbody.cases.case import CaseMetric
+
+PARAMETERS = {}
+VARIANTS = {"one": {}, "two": {}}
+
+
+def sleep(*_):
+    ctypes.PyDLL(None).sleep(1000)
+
+
+def build(variant, p):
+    if WHERE == "build" and variant == "two":
+        sleep()
+    never = {"never": CaseMetric(doc="", unit="m", number=sleep, always=True)}
+    metrics = never if WHERE == "metric" and variant == "two" else {}
+    return replace(cases.load("bouncing_ball", "linear"), name="hangs", variant=variant, metrics=metrics)
+"""
+
+
+def test_a_metric_that_never_comes_back_is_a_row_that_crashed(tmp_path: Path) -> None:
+    (tmp_path / "hangs.py").write_text(f"WHERE = 'metric'\n{HANGS}")
+    limit = str(4 + round(4 * load()))
+    code, said = finished(begun("run", "hangs.py", "-e", "fake:exact", "--time-limit", limit, cwd=tmp_path))
+    assert code == 1, said
+    assert f"hangs:two: never of fake:exact: It did not return within {limit} s" in said
+    rows = pd.read_parquet(tmp_path / "out" / "verdicts.parquet")
+    crashed = rows[rows["verdict"] == "crashed"]
+    assert set(crashed["metric"]) == {"never"}
+    assert crashed["why"].str.contains("did not return").all()
+    assert {"position", "velocity"} <= set(rows.loc[rows["variant"] == "two", "metric"])
+
+
+@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+def test_a_case_that_is_never_built_is_told_in_a_sentence(dry: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "hangs.py").write_text(f"WHERE = 'build'\n{HANGS}")
+    code, said = finished(begun("run", "hangs.py", "-e", "fake:exact", "--time-limit", "1", *dry, cwd=tmp_path))
+    assert code == 2, said
+    assert "hangs.py cannot be built. It did not return within 1 s and was terminated" in said
+    assert not (tmp_path / "out").exists()
 
 
 def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_path: Path) -> None:

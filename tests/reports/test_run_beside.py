@@ -83,7 +83,9 @@ def alive(process: int) -> bool:
 def test_the_missing_cases_run_the_largest_first_and_each_is_told_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
     names = ("newtons_cradle", "bouncing_ball", "bouncing_ball", "red_body")
     shown, done, some = list[str](), list[int](), [cases.load(name) for name in names]
-    there: Any = SimpleNamespace(has=lambda name: name == command.key(1, some[1]))
+    there: Any = SimpleNamespace(
+        has=lambda name: name == command.key(1, some[1]), begin=lambda: None, keep=lambda: None
+    )
 
     def beside(todo: Sequence[Callable[[], int]], at_once: int, tell: Callable[[int], None]) -> int:
         for k, run in enumerate(todo):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +15,7 @@ import log_files
 import numpy as np
 import pytest
 
+from crossbody import engines
 from crossbody.cases import InvalidValue
 from crossbody.reference import compiling
 from crossbody.reports import voice
@@ -136,3 +141,34 @@ def test_what_is_compiled_is_told_unless_nothing_is_to_be(
     assert ("compiling the reference" in capsys.readouterr().err) == told
     counted.tell()
     assert "compiling the reference" in capsys.readouterr().err, "for the command alone"
+
+
+@pytest.mark.parametrize("name", ["run", "list"])
+def test_what_compiled_code_prints_is_no_result(
+    name: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """By C's own buffer, which is written when it is full or the process ends, and by the descriptor."""
+    c, real = ctypes.CDLL(None), engines.load
+
+    def load(engine: str) -> engines.Engine:
+        c.puts(b"from C")
+        os.write(1, b"by descriptor\n")
+        return real(engine)
+
+    monkeypatch.setattr(engines, "load", load)
+    words = {"run": ("-e", "reference:compiled", "--variant", "linear"), "list": ()}[name]
+    assert call(name, "bouncing_ball" if name == "run" else "reference", *words, "--json") == 0
+    c.fflush(None)
+    told = capfd.readouterr()
+    assert json.loads(told.out)
+    assert "from C" in told.err
+    assert "by descriptor" in told.err
+    print("on it goes")
+    assert capfd.readouterr().out == "on it goes\n"
+
+
+def test_json_is_whole_where_nobody_listens_to_errors(tmp_path: Path) -> None:
+    command = f"{sys.executable} -c 'from crossbody.reports.entry import main; main()' list --json 2>&-"
+    done = subprocess.run(["sh", "-c", command], cwd=tmp_path, stdout=subprocess.PIPE, timeout=60)
+    assert done.returncode == 0
+    assert json.loads(done.stdout)

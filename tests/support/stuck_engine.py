@@ -15,6 +15,7 @@ def patched(arguments: list[str] | None) -> int:
     import signal
     import time
     from dataclasses import replace
+    from pathlib import Path
     from types import MappingProxyType
 
     from crossbody import engines
@@ -23,6 +24,7 @@ def patched(arguments: list[str] | None) -> int:
 
     def act(case: Any, profile: str) -> Any:
         if profile == "stuck":
+            Path("stuck").touch()
             ctypes.PyDLL(None).sleep(1000)  # as compiled code does: the interpreter is not let go
         if profile == "slow":
             time.sleep(1.0)
