@@ -20,6 +20,7 @@ from crossbody.reports.measuring.truth import Truth
 UNIT = "1"
 CLAIMED = False
 SAME = 1e-12  # part of the horizon within which two instants are one
+JOINS = 1e-6  # gap, m or rad (relative to positions above 1), that tolerances leave to one that touches beside another
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -29,19 +30,26 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     laws without memory let go at the surface whatever pushes there. So does, of a contact that sticks, how
     far its friction is below its bound: where it reaches that, and would jam, its multiplier jumps to zero.
     Left out are those at whose instant something else happens, by which a multiplier may jump through zero,
-    and a start in contact. Only what is beyond the errors of a row at its surface counts. None without rows
-    that open, and where gaps depend on discrete variables; NaN where an event has no instant.
+    and a start in contact. Only what is beyond the errors of a row at its surface counts; where one touch is
+    located another may join that is as near as positions are known. None without rows that open, and where
+    gaps depend on discrete variables; NaN where an event has no instant.
     """
     system = equations(case)
     if not case.law.unilateral.any() or len(run.t) < 2 or (system is not None and system.jumps):
         return None
     near, light = AT_REST * _size(run.q), LIGHT * _size(run.lam)
     alone, found = _alone(run, case, system), [0.0]
+    located = {
+        event.t for event in run.events
+        if _touches(event) and _ways(run.t, run.gap[:, event.contact], event.t, near) == 0.0
+    }  # fmt: skip
     for event in run.events:
         row = event.contact
         if not case.law.unilateral[row] or event.t <= run.t[0]:
             continue
         gap = _ways(run.t, run.gap[:, row], event.t, near)
+        if gap > 0.0 and _touches(event) and event.t in located:
+            gap = _ways(run.t, run.gap[:, row], event.t, JOINS * _size(run.q))
         if _at_surface(event) or np.isnan(gap):
             found.append(gap)
         elif gap > 0.0 and event.before in CLOSED and event.after not in CLOSED and alone(event.t):
@@ -55,10 +63,13 @@ def _size(signal: Floats) -> float:
     return max(1.0, float(np.nanmax(np.abs(signal), initial=0.0)))
 
 
+def _touches(event: Event) -> bool:
+    return event.before == Mode.FREE and event.after in CLOSED
+
+
 def _at_surface(event: Event) -> bool:
     """Whether the law lets an event happen nowhere but at h = 0."""
-    touches = event.before == Mode.FREE and event.after in CLOSED
-    return touches or (event.before, event.after) == (Mode.BALLISTIC, Mode.FREE)
+    return _touches(event) or (event.before, event.after) == (Mode.BALLISTIC, Mode.FREE)
 
 
 def _alone(run: Trajectory, case: Case, system: System | None) -> Callable[[float], bool]:

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from resting import plate
+from resting import run as run_to_the_end
 
 from crossbody.cases import Case, Event, Ledger, Mode, Tier, Trajectory, load
 from crossbody.cases.arrays import Floats
@@ -347,6 +349,18 @@ def test_a_start_in_contact_is_no_touch_that_is_off_its_surface(truth: Truth, ca
     )
     later = tuple(replace(e, t=0.01 * case.t_end) for e in begun)
     assert measure("event_gap", truth, replace(run, events=later), case) > 1.0
+
+
+@pytest.mark.parametrize(("off", "limit"), [(0.0, 0.0), (5e-7, 0.0), (1e-3, np.inf)])
+def test_what_touches_beside_another_is_known_as_positions_are(off: float, limit: float) -> None:
+    case = plate(np.array([(x, y, 0.0) for x in (-0.1, 0.1) for y in (-0.1, 0.1)]), height=0.05, t_end=0.2)
+    run = run_to_the_end(case)
+    touch = next(event.t for event in run.events)
+    assert sum(event.t == touch for event in run.events) == 4
+    gap = run.gap.copy()
+    gap[run.t == touch, 1] += off
+    found = measure("event_gap", from_run(run, Tier.A, "itself"), replace(run, gap=gap), case)
+    assert (found == 0.0) if limit == 0.0 else (1e-6 < found < limit)
 
 
 @pytest.mark.parametrize("level", [-3e6, 3e6])
