@@ -60,8 +60,23 @@ def bound(m: Model, i: int, normal: float) -> float:
 
 @compiled
 def small_slip(s: Any) -> float:
-    """The slip velocity below which the direction of the last step's start holds."""
-    return float(max(SMALL_SLIP, SMALL_SLIP_STEPS * s.rtol) * s.slip_speed + s.atol)
+    """The slip velocity below which the direction of the last step's start holds.
+
+    Where all is at rest speeds are those of errors alone: what drives bodies says then what is slow.
+    """
+    return float(_known_to(s) * max(s.slip_speed, s.gained_speed) + s.atol)
+
+
+@compiled
+def least_slip(s: Any) -> float:
+    """The slip velocity below which one that falls has stopped, as far as known: small beside slow slides as well."""
+    return float(_known_to(s) * s.slip_speed + s.atol)
+
+
+@compiled
+def _known_to(s: Any) -> float:
+    """To what part of the largest speed a slip velocity is known."""
+    return float(max(SMALL_SLIP, SMALL_SLIP_STEPS * s.rtol))
 
 
 @compiled

@@ -17,6 +17,7 @@ from crossbody.reference.core.friction import (
     bound,
     decided_to,
     has_begun,
+    least_slip,
     most_drift,
     slip,
     slip_along,
@@ -29,8 +30,8 @@ from crossbody.reference.kinds import Array, Bytes
 # Guards: each fires where all of its functions are below zero.
 NONE, TOUCH, TOUCH_INSIDE, RELEASE, LEAVE, CATCH, PRESS, HANDOVER, SWITCH, CONE, STOP, JAM, DRIFT = np.arange(13)
 FUNCTIONS = np.array([0, 1, 2, 1, 1, 2, 1, 4, 1, 1, 1, 1, 1])
-GRAZE = 0.1  # part of the slip velocity without a direction of its own, by which one may pass zero
 ON_BOUND = 1e-10  # part of the bound of a contact's friction below which one that sticks has only begun to
+GRAZE = 0.1  # part of the least slip velocity by which one may pass zero
 REDUNDANT = 1e30  # for a row that the active ones determine: it has no multiplier of its own, so that nothing fires
 
 
@@ -87,7 +88,8 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
         w.bands[1] = 2.0 * decided_to(s) if s.frictional else 0.0
     elif kind == STOP:
         # A slip that grazes zero goes on; one that has just begun is known no better than a slip with no direction.
-        w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + (1.0 if has_begun(w, i) else GRAZE) * small_slip(s)
+        below = small_slip(s) if has_begun(w, i) else GRAZE * least_slip(s)
+        w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + below
     elif kind == CONE:
         begun = max(ON_BOUND * bound(m, i, abs(w.lams[0, i])), w.tolerated[i])
         if w.cones[0, i] <= begun:

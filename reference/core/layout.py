@@ -139,7 +139,8 @@ STATE = np.dtype(
         ("switches", "i8"),
         ("watched", "i8"),  # w.cones has the end of the last step
         ("jumps", "i8"),  # loads may do so at this instant, so that slips without a direction are decided anew
-        ("slip_speed", "f8"),  # largest speed seen at contacts with friction
+        ("slip_speed", "f8"),  # largest speed seen at contacts with friction,
+        ("gained_speed", "f8"),  # and that which what drives them gives in the time in which rows return to their laws
         ("unknowns", "i8"),  # of the algebra of friction: how many,
         ("normals", "i8"),  # and how many are no sticking rows
         ("rank", "i8"),

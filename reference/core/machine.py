@@ -377,7 +377,8 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return released_mode(mode[i], h) if w.lam[i] < -w.noise[i] else int(mode[i])
     collides = s.frozen != 0 and m.beta[i, 0] > 0.0
     if _rests(s, w, i):
-        return active_mode(s, m, w, i) if _would_press(K, s, m, w, mode, i, False) else int(mode[i])
+        presses = _would_press(K, s, m, w, mode, i, False) or (mode[i] == FREE and _stays(K, s, m, w, mode, i))
+        return active_mode(s, m, w, i) if presses else int(mode[i])
     if h > (s.touch if collides and mode[i] == FREE else 0.0):
         return FREE
     if collides and rate < -slow(s):

@@ -13,6 +13,7 @@ from crossbody.reference.core.friction import (
     has_begun,
     has_friction,
     is_tangent,
+    least_slip,
     slip,
     slip_along,
     small_slip,
@@ -53,7 +54,7 @@ def face(m: Model, w: Work, i: int, rate: Array) -> None:
 def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
     """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips.
 
-    What their bodies gain while a row returns to its law counts too: in a scene at rest speeds are those of errors.
+    What their bodies gain while a row returns to its law stands beside it: at rest speeds are those of errors.
     """
     for i in range(s.nc):
         if has_friction(m, i):
@@ -62,7 +63,7 @@ def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
         i, size = w.idx[j], 0.0
         returns = max(m.alpha[i, 1], np.sqrt(m.alpha[i, 0])) if has_friction(m, i) else 0.0
         if returns > 0.0:
-            s.slip_speed = max(s.slip_speed, w.scale[j] / returns)
+            s.gained_speed = max(s.gained_speed, w.scale[j] / returns)
         for c in range(m.span[i, 0], m.span[i, 1] if is_tangent(m, i) else 0):
             size += abs(w.H[j, c] * w.y[s.nq + c])
         s.slip_speed = max(s.slip_speed, size)
@@ -110,13 +111,13 @@ def _lingers(s: Any, m: Model, w: Work, i: int, rate: Array) -> bool:
 
     Others hold the body, and what they leave it dies out without ever passing zero. Such a contact is at rest.
     """
-    if has_begun(w, i) or slip(m, w, i, rate) > small_slip(s):
+    if has_begun(w, i) or slip(m, w, i, rate) > least_slip(s):
         w.within[i] = np.inf
         return False
     w.within[i] = min(w.within[i], s.t)
     c = w.listed[m.tangent[i]]
     brake = bound(m, i, w.lam0[i]) * w.gram[c, c]
-    return bool((s.t - w.within[i]) * brake > LINGERS * small_slip(s))
+    return bool((s.t - w.within[i]) * brake > LINGERS * least_slip(s))
 
 
 @compiled

@@ -137,6 +137,7 @@ class Parts:
             voice.note(self._kept())
         if self.lock >= 0:
             os.close(self.lock)
+            self.lock = -1
 
 
 def _offer(left: Path) -> None:

@@ -225,7 +225,7 @@ def test_versions_are_stated(name: str) -> None:
     assert all(version[0].isdigit() for version in FOUND[name].versions.values())
 
 
-def test_a_dry_run_builds_nothing_of_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dry_run_builds_nothing_of_the_reference(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """What would be compiled for a run; the settings told are those that it has all the same."""
     case, engine = cases.load("bouncing_ball"), engines.load("reference")
     told = {profile: dict(engine.prepare(case, profile).settings) for profile in ("compiled", "ida")}
@@ -235,4 +235,4 @@ def test_a_dry_run_builds_nothing_of_the_reference(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr("crossbody.engines.reference.system_of", build)
     assert {profile: dict(engine.planned(case, profile)) for profile in told} == told
-    assert tell(["bouncing_ball"], ["reference"], None, (), ()) == 0
+    assert tell(["bouncing_ball"], ["reference"], None, (), None, (), tmp_path / "out", None, (), 0.0) == 0
