@@ -156,6 +156,8 @@ def respond(s: Any, m: Model, w: Work, r: Array, la: Array) -> None:
 @compiled
 def _solve_unknowns(s: Any, m: Model, w: Work, r: Array) -> None:
     """Leave in w.found the unknowns, scaled by their sizes."""
+    if s.dependent_rows > 0 and s.spent_factors:
+        factor_in_turn(s, m, w, s.most_second)
     for a in range(s.unknowns):
         w.found[a] = r[w.unknown[a]] / w.size[a]
     if s.dependent_rows > 0:

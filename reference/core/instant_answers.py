@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crossbody.reference.core.advance import JAMMING, all_jam, fire, jams
+from crossbody.reference.core.firing import all_jam, fire, jams
 from crossbody.reference.core.instant import FIRE, JAM, SETTLE, SHARE
 from crossbody.reference.core.layout import Buffers, Model, Work
 from crossbody.reference.core.settle import settle, share
@@ -25,4 +25,4 @@ def answer(what: int, K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         return int(settle(K, s, m, w, b))
     if what == SHARE:
         return int(share(K, s, m, w, b))
-    return int(jams(K, s, m, w, b, JAMMING) if what == JAM else all_jam(K, s, m, w, b))
+    return int(jams(K, s, m, w, b) if what == JAM else all_jam(K, s, m, w, b))

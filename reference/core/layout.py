@@ -274,7 +274,7 @@ class Work:
     share: Floats  # (nc,) what each of them carries
     trial: Floats  # (nc,) what it would carry without bounds
     allowed: Floats  # (nc,) by how much a row may be off its law
-    let_go: Floats  # (nc,) instant at which others lifted a row off that shared a load with them
+    let_go: Floats  # (nc,) instant at which others lifted a row off that shared a load with them, or friction let it go
     lam: Floats  # (nc,) of all rows at the last evaluation
     lam0: Floats  # at the step's start
     lam_at: Floats2  # (12, nc) multipliers at the stages, 0 left out

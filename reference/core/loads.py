@@ -69,12 +69,6 @@ def _start(s: Any, w: Work) -> None:
 @compiled
 def solve_in_turn(s: Any, m: Model, w: Work) -> None:
     """Solve for w.found the normal rows, and in their null space the sticking ones, by loads that suit these."""
-    if s.spent_factors:
-        for a in range(s.unknowns):
-            w.known[a] = w.found[a]
-        factor_in_turn(s, m, w, s.most_second)
-        for a in range(s.unknowns):
-            w.found[a] = w.known[a]
     _start(s, w)
     for _ in range(SHARINGS if s.rank_second < s.unknowns - s.normals else 1):
         _weigh(s, m, w)

@@ -140,10 +140,9 @@ def _decide_friction(s: Any, m: Model, w: Work, b: Buffers) -> int:
         elif is_decided(w, i) and is_active(b.mode[i]):
             after = w.state[i] if has_friction(m, i) else b.mode[i]
             if w.state[i] == FREE:
-                after = released_mode(b.mode[i], w.gap[i])
+                after, w.let_go[i] = released_mode(b.mode[i], w.gap[i]), s.t
             if after != b.mode[i]:
                 change(s, b, i, after)
-                w.let_go[i] = s.t if w.state[i] == FREE else w.let_go[i]
     return code
 
 
@@ -276,7 +275,8 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if s.frictional and code == 0:
         code = evaluate(K, s, m, w, b.mode)
         ask(SETTLED, s, m, w, NOTHING)
-    s.touch = 0.0 if s.frictional else s.touch
+    if s.frictional:
+        s.touch = 0.0
     begin_watch(K, s, m, w)
     s.lenient = np.inf
     return int(code)

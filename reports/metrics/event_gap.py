@@ -47,9 +47,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         row = event.contact
         if not case.law.unilateral[row] or event.t <= run.t[0]:
             continue
-        gap = _ways(run.t, run.gap[:, row], event.t, near)
-        if gap > 0.0 and _touches(event) and event.t in located:
-            gap = _ways(run.t, run.gap[:, row], event.t, JOINS * _size(run.q))
+        joins = _touches(event) and event.t in located
+        gap = _ways(run.t, run.gap[:, row], event.t, JOINS * _size(run.q) if joins else near)
         if _at_surface(event) or np.isnan(gap):
             found.append(gap)
         elif gap > 0.0 and event.before in CLOSED and event.after not in CLOSED and alone(event.t):

@@ -1,0 +1,121 @@
+"""The transitions that fired at a step's end, and whether contacts jam there: once an event, as `instant` asks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from crossbody.reference.cache import compiled
+from crossbody.reference.core import events, guards, journal, settle
+from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, scatter
+from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, NOTHING, ask, has_friction, is_dry
+from crossbody.reference.core.layout import (
+    BALLISTIC,
+    FREE,
+    LOST,
+    MODE_CYCLE,
+    PAINLEVE,
+    SLIP,
+    STICK,
+    Buffers,
+    Model,
+    Work,
+)
+from crossbody.reference.core.machine import active_mode
+from crossbody.reference.kernels import LOST as IS_LOST
+
+JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
+
+
+@compiled
+def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Apply the transitions that fired at the step's end; a code where nothing can follow from them."""
+    journal.remember(s, b)
+    moved, touched, stopped, drifts, caught = False, False, False, False, False
+    s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta:
+            after = events.after(s, m, w, b.mode, i, w.gap[i])
+            stopped = stopped or events.stops(s, m, w, i)
+            drifts = drifts or w.kind[i] == guards.DRIFT
+            caught = caught or w.kind[i] == guards.CATCH
+            if after != b.mode[i]:
+                touched = touched or b.mode[i] == FREE
+                journal.move(s, b, i, after)
+                moved = True
+    for i in range(s.nc if stopped else 0):
+        if events.stops_too(s, m, w, b.mode, i):
+            journal.move(s, b, i, STICK)
+    for i in range(s.nc if drifts else 0):
+        if events.drifts_too(s, m, w, b.mode, i):
+            journal.move(s, b, i, SLIP)
+    for i in range(s.nc if caught else 0):
+        if events.catches_too(K, s, m, w, b.mode, i):
+            journal.move(s, b, i, active_mode(s, m, w, i))
+    for i in range(s.nc if touched else 0):
+        if events.touches_too(s, m, w, b.mode, i):
+            journal.move(s, b, i, active_mode(s, m, w, i))
+    if moved and journal.remember(s, b):
+        if s.one_by_one:
+            return PAINLEVE if s.frictional and all_jam(K, s, m, w, b) else MODE_CYCLE
+        s.one_by_one, s.history = 1, 0
+    for i in range(s.ng):
+        if w.guard_hit[i] <= s.theta:
+            s.jumps = 1
+            if settle.switch(K, s, m, w, b, np.int64(i)) == IS_LOST:
+                return LOST
+    return 0
+
+
+@compiled
+def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Let contacts that begin to slide do so against what held them; whether some have jammed.
+
+    One that lets go where it pulls has jammed if its force has changed its sign through infinity. Leaves in s.jumps
+    whether loads jump: not where a force reaches its bound or vanishes.
+    """
+    slips, jam, released, s.jumps = False, False, False, 0
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta:
+            s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
+            jam = jam or (w.kind[i] == guards.JAM and not events.stops(s, m, w, i))
+            slips = slips or w.kind[i] == guards.CONE
+            released = released or (w.kind[i] == guards.RELEASE and b.mode[i] == SLIP)
+    nq, known = s.nq, slips or released
+    if known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
+        scatter(s, w, w.lam0)
+        pulls = events.pulling(s, m, w, b.mode) if released else -1
+        jam = jam or (pulls >= 0 and w.kind[pulls] == guards.RELEASE and ask(DETERMINANT, s, m, w, pulls) <= 0.0)
+        if slips:
+            ask(BEGIN_SLIP, s, m, w, NOTHING)
+    return jam
+
+
+@compiled
+def all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Whether contacts that let go in turn would jam, or nearly, if all pressed that close; it marks these."""
+    for i in range(s.nc):
+        closes = has_friction(m, i) and b.mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
+        if closes and not is_dry(m, i):
+            b.mode[i] = active_mode(s, m, w, i)
+    activate(s, m, w, b.mode)
+    return bool(jams(K, s, m, w, b))
+
+
+@compiled
+def jams(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Whether contacts that slide jam, or come near to it; it marks these, and leaves other marks where none does.
+
+    Before they jam their forces grow without bound, so that no step is short enough, unless what drives them vanishes
+    as well.
+    """
+    nq, found, marks = s.nq, False, b.history[len(b.history) - 1]
+    if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
+        for i in range(s.nc):
+            slides = has_friction(m, i) and b.mode[i] == SLIP and not is_dry(m, i)
+            if slides and ask(DETERMINANT, s, m, w, i) < JAMMING:
+                if not found:
+                    marks[:] = 0
+                marks[i], found = 1, True
+    return found
