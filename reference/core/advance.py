@@ -42,6 +42,7 @@ from crossbody.reference.core.layout import (
     PAINLEVE,
     ROWS_FULL,
     SHORT,
+    STANDSTILL,
     STEP_TOO_SMALL,
     TOO_LONG,
     Buffers,
@@ -56,7 +57,9 @@ from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
-STANDSTILL = 20  # switches at one instant, beside one for every row
+STILL = (
+    4096.0  # units of rounding of time by which it does not go on: forces that grow without bound switch ever sooner
+)
 SHORTER = 0.1  # the least part of a step that is taken anew because slips turn in it, wherever in it something fires
 
 
@@ -215,8 +218,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     before_rows = s.rhs
     record.within_step(K, s, m, w, b.mode, b.samples, t, b.out, b.modes)
     s.trial_rhs += s.rhs - before_rows  # what is written down is no work of the method, and chooses none
-    s.standing = s.standing + 1 if fired and t == s.t_old else 0
-    if s.standing > STANDSTILL + s.nc:
+    s.standing = s.standing + 1 if fired and t - s.t_old <= STILL * ULP * abs(t) else 0
+    if s.standing > STANDSTILL + s.nc + 1:
         return _stuck(K, s, m, w, b, STEP_TOO_SMALL)
     if fired:
         _land(K, s, m, w)

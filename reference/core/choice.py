@@ -9,9 +9,9 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import dop853
 from crossbody.reference.core.acceleration import push_rows
-from crossbody.reference.core.algebra import solve_schur
+from crossbody.reference.core.algebra import ULP, solve_schur
 from crossbody.reference.core.dop853_table import E3, STABILITY_LIMIT, STAGES
-from crossbody.reference.core.friction import BEGUN, NOTHING, TURNING_RATE, ask
+from crossbody.reference.core.friction import BEGUN, TURNING_RATE, ask
 from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work
 
 SAFETY = 0.9
@@ -23,6 +23,7 @@ STALLED_STEPS = 5  # explicit steps at the stability limit before the implicit m
 STALLED_PART = 0.35  # of the limit, where a stiff row that every step excites keeps an explicit step at rtol 1e-6
 TRIAL_STEPS = 12  # implicit steps before the two are compared
 HOLD_STEPS = 400  # explicit steps after a trial that was lost
+ROUNDED = 1e3  # units of rounding of the velocities by which stages must differ to tell of a rate
 ERROR_PART = 0.0531  # what the implicit estimate of order 3 is of the explicit one: E A^3 1 of both tables
 
 
@@ -61,8 +62,8 @@ def longest_step(s: Any, m: Model, w: Work) -> float:
     s.row_rate = _row_rate(s, w)
     rate = s.row_rate
     if s.frictional:
-        s.turning_rate = ask(TURNING_RATE, s, m, w, NOTHING)
-        rate = max(s.row_rate, ask(TURNING_RATE, s, m, w, BEGUN))
+        s.slip_rate = ask(TURNING_RATE, s, m, w, BEGUN)
+        rate = max(s.row_rate, s.slip_rate)
     return float(min(s.h_max, STABILITY_LIMIT / rate) if rate > 0.0 else s.h_max)
 
 
@@ -77,6 +78,20 @@ def _row_rate(s: Any, w: Work) -> float:
         over = half * half - stiffness
         fastest = max(fastest, half + np.sqrt(over) if over > 0.0 else np.sqrt(stiffness))
     return float(fastest)
+
+
+@compiled
+def stage_rate(s: Any, w: Work) -> float:
+    """Fastest rate, 1/s, that two stages at the end of an explicit step show: by how much their accelerations differ.
+
+    Hairer, Noersett and Wanner, Solving Ordinary Differential Equations I, section II.10. 0 where rounding parts them.
+    """
+    apart, faster, speed = 0.0, 0.0, 0.0
+    for a in range(s.nq, s.nq + s.n):
+        apart += (w.y1[a] - w.ys[a]) ** 2
+        faster += (w.k[STAGES, a] - w.k[STAGES - 1, a]) ** 2
+        speed += w.y1[a] ** 2
+    return float(np.sqrt(faster / apart) if apart > (ROUNDED * ULP) ** 2 * speed else 0.0)
 
 
 @compiled
@@ -111,7 +126,7 @@ def choose_method(s: Any, w: Work) -> None:
     if s.method == EXPLICIT:
         if s.hold > 0:
             s.hold -= 1
-        rate = max(s.row_rate, s.turning_rate) if s.frictional else s.row_rate
+        rate = max(s.row_rate, s.slip_rate) if s.frictional else s.row_rate
         s.stalled = s.stalled + 1 if s.hs * rate > STALLED_PART * STABILITY_LIMIT else 0
         pays = s.promised / LEAST_COST > s.hs / EXPLICIT_COST
         if s.implicit and s.hold == 0 and s.stalled >= STALLED_STEPS and pays:

@@ -18,12 +18,35 @@ def lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[f
     So its direction changes steadily to that of reference where it vanishes, and is never more than a right angle off
     it: a jump would end every step. Clear of zero and ahead it is left as it is.
     """
+    t = m.tangent[i]
+    p, r = w.way[t], w.way[t + 1]
+    aside = y * p - x * r
+    ahead = max(x * p + y * r, _least_ahead(s, aside))
+    return ahead * p - aside * r, ahead * r + aside * p
+
+
+@compiled
+def _least_ahead(s: Any, aside: float) -> float:
+    """The least that a slip counts along its reference, by what it is across it."""
+    small = small_slip(s)
+    part = 1.0 - (aside / small) ** 2 if abs(aside) < small else 0.0
+    return float(small * part * part)
+
+
+@compiled
+def bend(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
+    """Return by how much the direction of the slip velocity (x, y) of contact i turns, in radians, with x and with y."""
     t, small = m.tangent[i], small_slip(s)
     p, r = w.way[t], w.way[t + 1]
-    ahead, aside = x * p + y * r, y * p - x * r
-    part = 1.0 - (aside / small) ** 2 if abs(aside) < small else 0.0
-    ahead = max(ahead, small * part * part)
-    return ahead * p - aside * r, ahead * r + aside * p
+    ahead, aside, least = x * p + y * r, y * p - x * r, _least_ahead(s, y * p - x * r)
+    along, across = -aside, ahead
+    if ahead <= least:  # it is lengthened: what it is along its reference does not count
+        falls = -4.0 * (1.0 - (aside / small) ** 2) * aside / small if abs(aside) < small else 0.0
+        along, across, ahead = 0.0, least - aside * falls, least
+    size2 = ahead * ahead + aside * aside
+    if not size2 > 0.0:
+        return 0.0, 0.0
+    return (along * p - across * r) / size2, (along * r + across * p) / size2
 
 
 @compiled

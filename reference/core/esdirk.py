@@ -114,15 +114,14 @@ def _row_part(s: Any, m: Model, w: Work, j: int) -> None:
 @compiled
 def _slip_part(s: Any, m: Model, w: Work, i: int) -> None:
     """Add what follows from friction that turns with the slip of contact i."""
-    turn = ask(TURN_PART, s, m, w, i)
-    if turn == 0.0:
+    if ask(TURN_PART, s, m, w, i) == 0.0:
         return
     c, t = w.listed[m.tangent[i]], m.tangent[i]
     w.d[:] = 0.0
     push_rows(m, w, s.na, w.la, 1.0, w.d)
     for a in range(s.n):
         for b in range(m.span[t, 0], m.span[t, 1]):
-            w.Jv[a, b] += w.d[a] * turn * (w.along[c] * w.H[c + 1, b] - w.along[c + 1] * w.H[c, b])
+            w.Jv[a, b] += w.d[a] * (w.bent[t] * w.H[c, b] + w.bent[t + 1] * w.H[c + 1, b])
 
 
 @compiled

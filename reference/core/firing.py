@@ -17,6 +17,7 @@ from crossbody.reference.core.layout import (
     MODE_CYCLE,
     PAINLEVE,
     SLIP,
+    STANDSTILL,
     STICK,
     Buffers,
     Model,
@@ -34,6 +35,8 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     journal.remember(s, b)
     moved, touched, stopped, drifts, caught = False, False, False, False, False
     s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
+    if s.frictional and s.standing > STANDSTILL + s.nc:  # ever sooner before a jam: what goes on is clear of it
+        s.jam = s.jam or jams(K, s, m, w, b)
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])

@@ -43,10 +43,10 @@ def _respond(s: Any, m: Model, w: Work) -> None:
 @compiled
 def _turn_part(s: Any, m: Model, w: Work, i: int) -> float:
     """Return `turning.turn_part`, with what loops do to it in w.la."""
-    part = turning.turn_part(s, m, w, i)
+    turns = turning.turn_part(s, m, w, i)
     if s.loops:
         loops.complete(s, m, w, w.r, w.la, False)
-    return float(part)
+    return 1.0 if turns else 0.0
 
 
 def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
@@ -59,7 +59,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     MARGIN          how far contact i is from sliding
     WATCH           either of all contacts, into w.cones[i]
     TURNING_RATE    fastest rate at which a slip turns, i = 1 of those that have just begun
-    TURN_PART       1/|v_t|, and in w.la what a turn of contact i by one radian makes of all multipliers
+    TURN_PART       1 if the slip of contact i turns it, by w.bent, and in w.la what a radian makes of all multipliers
     STANDS          1 if contact i has no slip velocity
     HOLDS_ON        1 if contact i, which sticks, surely does so throughout the step
     BEGIN           of a run: forget what another one left

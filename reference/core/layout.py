@@ -31,12 +31,13 @@ BETWEEN = 3  # stages at which gaps and guards are looked at
 WINDOW_LEVELS = 26  # times that a step is halved in search of an event, and once: a dip as narrow is rounding
 FUNCTIONS_MOST = 4  # that make up one guard
 HANDOVER_PART = 0.01  # elastic part of lam at which a COLLISION hands over to CONTACT
+STANDSTILL = 20  # switches at one instant, beside one for every row, from which on time is said not to go on
 SETS = 64  # of modes that are remembered while those of friction are decided
 OF_FRICTION = (
     "way", "rest", "kept_way", "kept_other", "kept_excess", "along", "slides", "off", "listed", "decides", "stands",
     "state", "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among",
     "seen", "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated",
-    "turn_by", "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
+    "turn_by", "bent", "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
     "borne", "even", "known", "off_by",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
@@ -117,7 +118,7 @@ STATE = np.dtype(
         ("trial_t", "f8"),
         ("explicit_rate", "f8"),
         ("row_rate", "f8"),  # fastest pole of the active rows, at an explicit step's start
-        ("turning_rate", "f8"),  # fastest at which friction turns a slip, likewise
+        ("slip_rate", "f8"),  # fastest at which friction turns slips that have begun, or that its stages show
         ("have_jacobian", "i8"),
         ("full_jacobian", "i8"),
         ("jacobian_scale", "f8"),
@@ -375,7 +376,8 @@ class Work:
     turns: (
         Floats2  # how accelerations across contacts that begin to slide change with their directions, and its factors
     )
-    turn_by: Floats  # by how much each turns
+    turn_by: Floats  # by how much each turns, or what it makes of multipliers
+    bent: Floats  # by how much the direction of a sliding contact turns with the rate of its tangential row
     turning: Index  # their places
     turned: Index  # pivots
     within: Floats  # (nc,) instant since which a contact slides without a direction; inf for one that has one

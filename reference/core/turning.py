@@ -8,27 +8,23 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.coulomb import factor_as_held, respond
-from crossbody.reference.core.directions import lengthened
+from crossbody.reference.core.directions import bend
 from crossbody.reference.core.friction import has_begun, has_friction
 from crossbody.reference.core.layout import Model, Work
 
+TURN = 1e-5  # rad, of a direction by differences
 POWERS = 8  # of the matrix of turns, to know its fastest pole
 
 
 @compiled
-def _across(m: Model, w: Work, i: int) -> tuple[float, float]:
-    """Across the direction of slip of contact i: its part along both tangential rows."""
-    first = w.listed[m.tangent[i]]
-    return -w.along[first + 1], w.along[first]
-
-
-@compiled
-def _turning_slip(s: Any, m: Model, w: Work, i: int) -> float:
-    """Size of the slip velocity at the step's start by which contact i turns."""
+def _bend(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Fill w.bent with how the direction of contact i turns with its slip velocity, as at the step's start; if it does."""
     t = m.tangent[i]
+    if not w.slides[i] or m.tangents[i] == 1:
+        return False
     x, y = w.rates[0, t] - m.drift[t] - w.rest[t], w.rates[0, t + 1] - m.drift[t + 1] - w.rest[t + 1]
-    x, y = lengthened(s, m, w, i, x, y)
-    return float(np.sqrt(x * x + y * y))
+    w.bent[t], w.bent[t + 1] = bend(s, m, w, i, x, y)
+    return bool(w.bent[t] != 0.0 or w.bent[t + 1] != 0.0)
 
 
 @compiled
@@ -70,29 +66,53 @@ def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
     if count > 0 and s.dependent_rows > 0:
         factor_as_held(s, m, w)  # its place is used by others
     for b in range(count):
-        part = turn_part(s, m, w, w.turning[b])
+        turns = turn_part(s, m, w, w.turning[b])
         for a in range(count):
-            c, (x, y), total = w.listed[m.tangent[w.turning[a]]], _across(m, w, w.turning[a]), 0.0
-            for k in range(s.na):
-                total += (x * w.gram[c, k] + y * w.gram[c + 1, k]) * w.la[k]
-            w.turns[a, b] = part * total
+            t = m.tangent[w.turning[a]]
+            c, total = w.listed[t], 0.0
+            for k in range(s.na if turns else 0):
+                total += (w.bent[t] * w.gram[c, k] + w.bent[t + 1] * w.gram[c + 1, k]) * w.la[k]
+            w.turns[a, b] = total
     return _spectral_radius(w, count)
 
 
 @compiled
-def turn_part(s: Any, m: Model, w: Work, i: int) -> float:
-    """Fill w.la with what a turn of the slip of contact i by one radian makes of all multipliers; 1/|v_t|, or 0.
+def turn_part(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Fill w.la with what a turn of the slip of contact i by one radian makes of all multipliers; whether slips turn it.
 
-    Times the slip velocity across it is the turn. w.lam0 has the multipliers of the present instant.
+    By how much they do stands in w.bent. w.lam0 has the multipliers of the present instant.
     """
-    size = _turning_slip(s, m, w, i) if w.slides[i] and m.tangents[i] > 1 else 0.0
-    if not size > 0.0:
-        return 0.0
-    c, (x, y) = w.listed[m.tangent[i]], _across(m, w, i)
+    if not _bend(s, m, w, i):
+        return False
+    if s.dependent_rows > 0:
+        _turn_dependent(s, m, w, w.listed[m.tangent[i]])
+        return True
+    c = w.listed[m.tangent[i]]
+    x, y = -w.along[c + 1], w.along[c]
     force = -m.friction[i] * w.lam0[i]
     for j in range(s.na):
         w.r[j] = -force * (w.gram[j, c] * x + w.gram[j, c + 1] * y)
     respond(s, m, w, w.r, w.la)
     w.la[c] += force * x
     w.la[c + 1] += force * y
-    return float(1.0 / size)
+    return True
+
+
+@compiled
+def _turn_dependent(s: Any, m: Model, w: Work, c: int) -> None:
+    """Fill w.la with what a turn of the direction in places c and c + 1 does, by differences of what was last solved.
+
+    A load that is shared among rows that depend on each other is shared in other parts once a direction has turned.
+    """
+    x, y = w.along[c], w.along[c + 1]
+    for side in range(2):
+        turn = TURN if side == 0 else -TURN
+        w.along[c], w.along[c + 1] = x - turn * y, y + turn * x
+        factor_as_held(s, m, w)
+        respond(s, m, w, w.pushed, w.la)
+        for j in range(s.na):
+            w.turn_by[j] = w.la[j] if side == 0 else (w.turn_by[j] - w.la[j]) / (2.0 * TURN)
+    w.along[c], w.along[c + 1] = x, y
+    factor_as_held(s, m, w)
+    for j in range(s.na):
+        w.la[j] = w.turn_by[j]

@@ -98,7 +98,8 @@ def goes_on(scene: Any, found: Trajectory) -> bool:
     rows, t = Sliding(made, e := Equations(made), 1e-9), float(found.t[-1])
     q, v = found.q[-1].copy(), found.v[-1].copy()
     gap, rate = (a.copy() for a in e.gaps(t, q, v))
-    closed = [i for i in rows.ways if gap[i] <= 1e-12 and (rate[i] < 0.0 or Mode(int(found.mode[-1][i])) in (6, 7))]
+    held = [i for i in rows.ways if Mode(int(found.mode[-1][i])) in (Mode.STICK, Mode.SLIP)]  # above the surface too
+    closed = [i for i in rows.ways if i in held or (gap[i] <= 1e-12 and rate[i] < 0.0)]
     seen = rows.see(t, q, v, closed)
     slips = {i: slip for i in closed if np.linalg.norm(slip := rows.slip(seen, i)) > STILL}
     contacts = [Contact(seen.at[i], [seen.at[k] for k in rows.ways[i]], rows.mu[i], slips.get(i)) for i in closed]
