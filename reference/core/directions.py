@@ -35,7 +35,7 @@ def _least_ahead(s: Any, aside: float) -> float:
 
 @compiled
 def bend(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
-    """Return by how much the direction of the slip velocity (x, y) of contact i turns, in radians, with x and with y."""
+    """Return by how many radians the direction of the slip velocity (x, y) of contact i turns with x, and with y."""
     t, small = m.tangent[i], small_slip(s)
     p, r = w.way[t], w.way[t + 1]
     ahead, aside, least = x * p + y * r, y * p - x * r, _least_ahead(s, y * p - x * r)

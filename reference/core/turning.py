@@ -18,7 +18,7 @@ POWERS = 8  # of the matrix of turns, to know its fastest pole
 
 @compiled
 def _bend(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Fill w.bent with how the direction of contact i turns with its slip velocity, as at the step's start; if it does."""
+    """Fill w.bent with how the direction of contact i turns with its slip velocity, at the step's start; if it does."""
     t = m.tangent[i]
     if not w.slides[i] or m.tangents[i] == 1:
         return False
@@ -63,6 +63,7 @@ def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
         if has_friction(m, i) and w.slides[i] and m.tangents[i] > 1 and (not begun or has_begun(w, i)):
             w.turning[count] = i
             count += 1
+            _bend(s, m, w, i)
     if count > 0 and s.dependent_rows > 0:
         factor_as_held(s, m, w)  # its place is used by others
     for b in range(count):
@@ -78,9 +79,9 @@ def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
 
 @compiled
 def turn_part(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Fill w.la with what a turn of the slip of contact i by one radian makes of all multipliers; whether slips turn it.
+    """Fill w.la with what a turn of contact i by one radian makes of all multipliers; whether its slip turns it at all.
 
-    By how much they do stands in w.bent. w.lam0 has the multipliers of the present instant.
+    By how much it does stands in w.bent. w.lam0 has the multipliers of the present instant.
     """
     if not _bend(s, m, w, i):
         return False
