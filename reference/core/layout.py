@@ -101,6 +101,7 @@ STATE = np.dtype(
         ("contradiction", "f8"),  # times what is allowed by which such rows are off their laws, as evaluated last
         ("lenient", "f8"),  # the most that an evaluation may find of it
         ("parting", "i8"),  # at the step's end it is more than is allowed
+        ("strict", "i8"),  # no rows that stick may contradict each other where modes are decided
         ("barred", "i8"),  # 1 + the contact that lets go for ever as long as it may press at this instant, 0 for none
         ("redundant", "i8"),  # the most rows at one instant that follow from others
         ("have_dense", "i8"),

@@ -32,6 +32,7 @@ from crossbody.reference.core.mode_set import (
     first_row,
     jammed,
     keep,
+    off_stick,
     put,
     size_along,
 )
@@ -69,6 +70,7 @@ def _worst(s: Any, m: Model, w: Work) -> int:
             other, then = -1.0, STICK
             if w.state[i] == STICK:
                 other, then = (size_along(m, w, i, w.la) - bound(m, i, max(w.la[j], 0.0))) * w.gram[j, j], SLIP
+                other = max(other, off_stick(s, m, w, i)) if s.strict else other
             elif w.stands[i]:
                 other = max(-ahead(m, w, i), abs(aside(m, w, i)))
             if other > missing:
@@ -81,10 +83,17 @@ def _worst(s: Any, m: Model, w: Work) -> int:
 
 
 @compiled
+def aim(m: Model, w: Work, i: int) -> None:
+    """Take the direction against its force for that in which contact i would slide, or that in which it is driven."""
+    if not face_against(m, w, i, w.la):
+        face_against(m, w, i, w.bare)
+
+
+@compiled
 def change(m: Model, w: Work, i: int, becomes: int) -> None:
     """Put contact i in another mode; one that begins to slide does so against the force that held it."""
     if becomes == SLIP and w.stands[i]:
-        face_against(m, w, i, w.la)
+        aim(m, w, i)
     put(m, w, i, becomes)
 
 
@@ -161,13 +170,6 @@ def _relax(s: Any, m: Model, w: Work, j: int) -> None:
     for c in range(s.na):
         total -= w.gram[j, c] * w.la[c]
     w.la[j] += total / w.gram[j, j]
-
-
-@compiled
-def aim(m: Model, w: Work, i: int) -> None:
-    """Take the direction against its force for that in which contact i would slide, or that in which it is driven."""
-    if not face_against(m, w, i, w.la):
-        face_against(m, w, i, w.bare)
 
 
 @compiled

@@ -159,6 +159,12 @@ def face_against(m: Model, w: Work, i: int, x: Array) -> bool:
 
 
 @compiled
+def off_stick(s: Any, m: Model, w: Work, i: int) -> float:
+    """By how much faster than its law contact i moves, which sticks: it may contradict others that do."""
+    return size_along(m, w, i, w.excess) if s.dependent_rows > 0 else 0.0
+
+
+@compiled
 def ahead(m: Model, w: Work, i: int) -> float:
     """Tangential acceleration of contact i along its direction."""
     total = 0.0

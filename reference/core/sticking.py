@@ -28,6 +28,7 @@ from crossbody.reference.core.mode_set import (
     jammed,
     keep,
     look,
+    off_stick,
     put,
     put_as_they_are,
     put_as_they_stand,
@@ -40,6 +41,7 @@ from crossbody.reference.core.slips import face, note_speed
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 AT_BOUND = 2.0 * (1.0 - INSIDE)  # part of its bound below it at which a contact has reached it, where loads are shared
 ITSELF, BESIDE = 1, 2  # has reached its bound; with one that has
+SLIGHT = 1e-4  # part of the largest acceleration by which sticks may contradict each other
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 
 
@@ -118,6 +120,27 @@ def _found(s: Any, m: Model, w: Work) -> bool:
 
 
 @compiled
+def _meet_all(s: Any, m: Model, w: Work) -> None:
+    """Let sticks that contradict each other yield to a set that all rows meet, if there is one.
+
+    Two feet of a body that turns cannot both stand. Where they contradict each other slightly, as those of a flat one
+    that rocks, or where no set is met, they are met in the least squares.
+    """
+    most = 0.0
+    for j in range(s.na if s.dependent_rows > 0 and s.leeway == 0.0 else 0):
+        i = w.idx[j]
+        if has_friction(m, i) and w.state[i] == STICK:
+            most = max(most, off_stick(s, m, w, i))
+    if most <= SLIGHT * s.push_scale:
+        return
+    s.strict = 1
+    put_as_they_are(s, m, w)
+    if not (iterate(s, m, w, ALL) or swept(s, m, w, ALL) or swept(s, m, w, WORST) or approached(s, m, w)):
+        s.strict = 0
+        _found(s, m, w)
+
+
+@compiled
 def _found_if_fewer_begin(s: Any, m: Model, w: Work) -> bool:
     """Whether a consistent set is found if none begins to slide for being at its bound beside another one."""
     fewer = False
@@ -178,10 +201,12 @@ def decide(s: Any, m: Model, w: Work) -> int:
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
         if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
+    _meet_all(s, m, w)
     if s.one_by_one:
         _begin_at_last(s, m, w)
     _hold_what_stands(s, m, w)
     count_others(s, m, w)
+    s.strict = 0
     for j in range(s.na):
         i = w.idx[j]
         if has_friction(m, i):
