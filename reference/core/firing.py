@@ -60,7 +60,7 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         if events.touches_too(s, m, w, b.mode, i):
             journal.move(s, b, i, active_mode(s, m, w, i))
     if moved and journal.remember(s, b):
-        if s.one_by_one:
+        if s.one_by_one and s.standing > STANDSTILL:
             return PAINLEVE if s.frictional and all_jam(K, s, m, w, b) else MODE_CYCLE
         s.one_by_one, s.history = 1, 0
     for i in range(s.ng):
