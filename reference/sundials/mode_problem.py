@@ -24,6 +24,7 @@ from crossbody.reference.sundials.sliding import Seen, Sliding
 AGREES = 1e-10  # part of the largest acceleration by which a set of modes may be off
 SWEEPS = 3000
 MOST_SETS = 4096
+SLIGHTLY = 1e-4  # part of the largest acceleration by which contacts that stick may contradict each other
 STAYS = 1e-7  # part of the largest acceleration, below which what begins to slide goes nowhere
 JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
 CLEAR = 1e-5  # likewise, of what goes on where others have come to a jam
@@ -69,6 +70,7 @@ class ModeProblem:
         self.stands = {i for i in contacts if i in sliding.ways} - slides.keys()
         self.modes = {i: self._pressed(i, slides) for i in contacts}
         self.pressed_in = list[int]()
+        self._strict = False
         self.scale = float(np.abs(seen.bare).max(initial=0.0))
         self.limit = AGREES * self.scale
 
@@ -77,6 +79,10 @@ class ModeProblem:
         modes = {**self.modes, **dict.fromkeys(self.begins, Mode.SLIP)}
         ways = {**self.slides, **self.begins}
         found = self._pivoted(modes, ways) or self._swept(modes, ways) or self._searched(modes)
+        if found is not None and self._strays(found) > SLIGHTLY * self.scale:
+            self._strict = True
+            met = self._pivoted(modes, ways) or self._swept(modes, ways)
+            found, self._strict = met or found, met is not None
         if found is not None and (still := self._going_nowhere(found)):
             held = {i: Mode.STICK if i in still else mode for i, mode in found.modes.items()}
             tried = self._tried(held, {i: way for i, way in found.ways.items() if i not in still})
@@ -206,7 +212,7 @@ class ModeProblem:
                     force = float(np.linalg.norm(tried.lam[ways]))
                     bound = max(self.sliding.bound(self.seen, tried.lam, i), 0.0)
                     off.append(((force - bound) * heavy, Mode.SLIP))
-                    moved = float(np.linalg.norm(tried.excess[ways])) if i in self.sliding.dry else 0.0
+                    moved = self._off_stick(tried, i) if i in self.sliding.dry or self._strict else 0.0
                     off.append((moved if moved > OTHERWISE * self.scale else 0.0, Mode.SLIP))  # by rows it depends on
                 elif mode == Mode.SLIP and i in self.stands:
                     off.append((-float(tried.ways[i] @ tried.excess[ways]), Mode.STICK))
@@ -216,6 +222,14 @@ class ModeProblem:
             if worst[0] > self.limit:
                 found[i] = worst
         return found
+
+    def _off_stick(self, tried: Tried, i: int) -> float:
+        """By how much faster than its law contact i moves, which sticks."""
+        return float(np.linalg.norm(tried.excess[self._along(i)]))
+
+    def _strays(self, tried: Tried) -> float:
+        """The most by which contacts that stick, and depend on each other, cannot all do so."""
+        return max((self._off_stick(tried, i) for i, mode in tried.modes.items() if mode == Mode.STICK), default=0.0)
 
     def _contradict(self, tried: Tried) -> bool:
         """Whether contacts that press depend on each other, and cannot all follow their laws."""
@@ -238,7 +252,9 @@ class ModeProblem:
                 if modes[i] == Mode.SLIP and i in self.stands:
                     along = self._along(i)
                     drive = tried.excess[along] if i in self.sliding.dry else -tried.lam[along]
-                    drive = drive if drive.any() else -tried.lam[along]
+                    drive = (
+                        drive if drive.any() else -tried.lam[along] if i in self.sliding.dry else tried.excess[along]
+                    )
                     ways[i] = drive / np.linalg.norm(drive)
         return None
 
