@@ -89,6 +89,27 @@ def test_drakes_approximations_creep_as_they_are_written(mu: float, stiction: fl
     assert found.v[-1, 0] == pytest.approx(expected[approximation], rel=NEAR)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_sphere_is_caught_in_the_step_whose_middle_is_below_the_floor_and_comes_back_by_its_restitution(
+    seed: int,
+) -> None:
+    """Neither a step before nor behind; and what parts already, but is pressed back, comes to rest."""
+    rng, dt, e, radius = np.random.default_rng(seed), 1e-3, 0.5, 0.1
+    scene, turned = sphere_on_floor(0.3, radius), [1.0, 0.0, 0.0, 0.0]
+
+    def steps(gap: float, speed: float, t_end: float) -> Trajectory:
+        case = cases.from_scene(scene, q0=[0.0, 0.0, radius + gap, *turned], v0=[0, 0, speed, 0, 0, 0], t_end=t_end)
+        return ran("pinocchio", "admm", case, dt=dt, restitution=e)
+
+    found = steps(rng.uniform(0.01, 0.02), -rng.uniform(0.5, 2.0), 0.04)
+    k = int(np.flatnonzero(found.lam[:, 0])[0])  # of the step before
+    ahead = found.q[:, 2] - radius + 0.5 * dt * found.v[:, 2]
+    assert (ahead[: k - 1] > 0.0).all()
+    assert ahead[k - 1] <= 0.0
+    assert found.v[k, 2] == pytest.approx(-e * found.v[k - 1, 2], rel=1e-6)
+    assert steps(-1e-4, rng.uniform(0.1, 0.9) * G * dt, dt).v[-1, 2] == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("dt", [2e-3, 5e-4])
 def test_darts_creep_grows_with_its_step(dt: float) -> None:
     case = cases.load("sliding_block", "rests", t_end=0.1)
