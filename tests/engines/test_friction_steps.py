@@ -110,6 +110,16 @@ def test_a_sphere_is_caught_in_the_step_whose_middle_is_below_the_floor_and_come
     assert steps(-1e-4, rng.uniform(0.1, 0.9) * G * dt, dt).v[-1, 2] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("e", [0.2, 0.6, 0.9])
+@pytest.mark.parametrize(("name", "profile"), [("pinocchio", "admm"), ("dart", "matched")])
+def test_a_sphere_comes_back_by_the_restitution_that_was_asked_for(name: str, profile: str, e: float) -> None:
+    scene, speed = sphere_on_floor(0.3, 0.1), -3.0
+    case = cases.from_scene(scene, q0=[0, 0, 0.11, 1.0, 0, 0, 0], v0=[0, 0, speed, 0, 0, 0], t_end=0.02)
+    found = ran(name, profile, case, dt=1e-4, restitution=e).v[:, 2]
+    k = int(np.argmax(found > 0.0))
+    assert found[k] == pytest.approx(-e * found[:k].min(), rel=2e-3)
+
+
 @pytest.mark.parametrize("dt", [2e-3, 5e-4])
 def test_darts_creep_grows_with_its_step(dt: float) -> None:
     case = cases.load("sliding_block", "rests", t_end=0.1)
