@@ -115,6 +115,13 @@ def test_friction_beyond_its_bound_or_below_it_is_seen(factor: float) -> None:
     assert measured("friction_work", run) == pytest.approx(abs(factor - 1.0) * lost, rel=1e-2)
 
 
+def test_friction_is_held_against_its_own_bound_where_that_is_small() -> None:
+    """What a contact could bear at another time, or another contact bears, excuses nothing."""
+    lam, k = np.array(RUN.lam), int(np.flatnonzero(RUN.t > 0.5 * STOP)[0])
+    lam[k, 0] *= 0.25
+    assert measured("cone_violation", replace(RUN, lam=lam)) == pytest.approx(0.75, rel=1e-6)
+
+
 @pytest.mark.parametrize("angle", [0.1, -0.4, np.pi])
 def test_friction_that_is_not_against_the_slip_is_seen(angle: float) -> None:
     run = pushed(turned(angle))
