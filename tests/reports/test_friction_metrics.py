@@ -122,6 +122,14 @@ def test_friction_is_held_against_its_own_bound_where_that_is_small() -> None:
     assert measured("cone_violation", replace(RUN, lam=lam)) == pytest.approx(0.75, rel=1e-6)
 
 
+@pytest.mark.parametrize("row", [1, 2])
+def test_rows_of_friction_have_the_mode_of_their_contact(row: int) -> None:
+    mode = np.array(RUN.mode)
+    assert measured("mode_residual") == 0.0
+    mode[[7, 90], row] = Mode.FREE
+    assert measured("mode_residual", replace(RUN, mode=mode)) == 2.0
+
+
 @pytest.mark.parametrize("angle", [0.1, -0.4, np.pi])
 def test_friction_that_is_not_against_the_slip_is_seen(angle: float) -> None:
     run = pushed(turned(angle))
