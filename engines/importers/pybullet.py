@@ -24,8 +24,8 @@ class _Robot:
     }  # fmt: skip
     unseen = {  # noqa: RUF012
         "energy": "PyBullet tells no energy.",
-        "contacts": "PyBullet does not tell which of its shapes may touch.",
-        "surfaces": "PyBullet does not tell which of its shapes may touch.",
+        "contacts": "PyBullet does not report which of its shapes may touch.",
+        "surfaces": "PyBullet does not report which of its shapes may touch.",
     }  # fmt: skip
     precision = 1e-5
 

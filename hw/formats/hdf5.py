@@ -95,7 +95,7 @@ class HdfReader:
         if any(dtype.kind not in "fiub" for dtype in plain):
             return f"holds {str(item.dtype)[:LONGEST]}, not numbers"
         if item.shape is None or not layout(item.shape):
-            return f"has shape {item.shape}, which is no table"
+            return f"has shape {item.shape}, which is not a table"
         small = item.chunks and math.prod(item.chunks) * item.dtype.itemsize < TINY
         if small and _chunks(item) > MOST_CHUNKS:
             return f"is cut into more than {MOST_CHUNKS} chunks of less than {TINY} bytes: `h5repack` joins them"

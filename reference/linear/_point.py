@@ -94,7 +94,7 @@ def check_frictionless(system: System) -> None:
     if system.frictional:
         raise SceneError(
             "The system has friction (System.mu, System.friction_loss). Derivatives at many states and "
-            "estimates of forces are there for systems without; valid: linearise, trim, sensitivity."
+            "estimates of forces exist only for systems without it; valid: linearise, trim, sensitivity."
         )
 
 
@@ -124,8 +124,8 @@ def check_coordinates(system: System) -> None:
     if system.velocity is not None:
         raise SceneError(
             "System.velocity is given: q' is not v. Derivatives at many states and estimates "
-            "of forces are there for systems whose velocities are the derivatives of their "
-            "positions alone; valid: linearise, sensitivity."
+            "of forces exist only for systems whose velocities are the derivatives of their positions; valid: "
+            "linearise, sensitivity."
         )
 
 

@@ -56,7 +56,7 @@ def _seconds(runs: Mapping[str, Any], repeats: int) -> dict[str, float]:
 def _rings(repeats: int) -> Iterator[Row]:
     runs = {str(n): _run(cases.load("ball_maze", "solve", rings=n)) for n in (5, 50)}
     took = _seconds(runs, repeats)
-    how = "rings that the ball cannot reach are bounded away"
+    how = "rings that the ball cannot reach are excluded by bounds"
     yield ratio("50 rings over 5", took["50"] / took["5"], 1.2, _beside(took, 1e3, "ms"), how)
 
 
@@ -71,7 +71,7 @@ def _idle_balls(repeats: int) -> Iterator[Row]:
     yield ratio(
         "a collision among 200 balls over one among 5", took["200"] / took["5"], 3.0,
         _beside(took, 1e6, "us a collision"),
-        "guards of far neighbours are bounded away; a chain of rows is banded; masses are diagonal",
+        "guards of far neighbours are excluded by bounds; a chain of rows is banded; masses are diagonal",
     )  # fmt: skip
 
 

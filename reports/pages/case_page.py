@@ -34,7 +34,7 @@ AUDIT = columns(
     verdict=("Same", Kind.VERDICT),
 )  # fmt: skip
 AUDIT_TEXT = (
-    "Before anything is compared, every engine must have the same physics. M, bias, H and lam "
+    "Before motions are compared, every engine must have the same physics: M, bias, H and lam "
     "are evaluated at the same random states."
 )
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
@@ -76,7 +76,7 @@ def _glance(found: Results, case: CaseFiles) -> Section:
         context={
             "corner": "Metric", "heads": grid.heads(grid.ran(rows)), "wide": True, "filtered": False,
             "pages": (), "lines": grid.of_case(rows, case.page, case.label, _walls(found, case)),
-            "says": "A cell leads to its limit, its reason and the command that repeats it.",
+            "says": "Click a cell for its limit, the reason and the command that repeats it.",
         },
     )  # fmt: skip
 

@@ -370,11 +370,11 @@ NOTES = {
         "value of that unit. Across long steps of a solver, a cubic through q and v at both ends is drawn."
     ),
     "force": (
-        "A small delay of an impact changes lam at one instant a lot, but hardly its impulse: "
+        "A small delay of an impact changes lam a lot at one instant, but hardly its impulse: "
         "judge by the impulse. Instantaneous collisions are steps of the impulse."
     ),
 }
-IDLE_NOTES = {"force": "Without a force in every run", "penetration": "Never below the surface"}
+IDLE_NOTES = {"force": "Without force in every run", "penetration": "Never below the surface"}
 FIGURES: dict[str, tuple[str, Callable[..., Figure]]] = {
     "motion": ("Motion", motion),
     "force": ("Contact force", force),

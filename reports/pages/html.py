@@ -214,9 +214,7 @@ def _bytes(name: str) -> bytes:
     try:
         return (TEMPLATES / name).read_bytes()
     except FileNotFoundError:
-        raise OutputError(
-            f"{TEMPLATES / name} is not there; installing crossbody (pip install) puts it there."
-        ) from None
+        raise OutputError(f"{TEMPLATES / name} is missing; installing crossbody (pip install) creates it.") from None
 
 
 @cache

@@ -17,8 +17,8 @@ from crossbody.reports.suites._linear_arcs import LinearArcs
 
 PARAMETERS = {
     "n": Parameter(default=2, doc="number of coordinates", low=1, high=3),
-    "walls": Parameter(default=1, doc="number of walls, of which the first n are there", low=1, high=3),
-    "draw": Parameter(default=0, doc="seed of everything that is not named here", low=0, high=2**32 - 1),
+    "walls": Parameter(default=1, doc="number of walls; the first n exist", low=1, high=3),
+    "draw": Parameter(default=0, doc="seed of everything that is not given here", low=0, high=2**32 - 1),
     "a0": Parameter(default=1e4, unit="1/s^2", doc="stiffness of the walls", low=0.0, open_low=True),
     "zeta": Parameter(default=0.1, doc="damping ratio of the walls", low=0.0),
     "stiffness": Parameter(default=5.0, unit="N/m", doc="scale of the springs", low=0.0, open_low=True),

@@ -35,7 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     for option, text, word in (
         ("case", case, "CASE[:VARIANT]"),
         ("engine", engine, "E[:PROFILE]"),
-        ("audit", "a robot file that every engine's own reader is to read alike; repeatable", "FILE"),
+        ("audit", "a robot file that every engine's own reader must read alike; repeatable", "FILE"),
     ):
         group.addoption(f"--crossbody-{option}", action="append", default=[], metavar=word, help=text)
         parser.addini(f"crossbody_{option}s", f"where --crossbody-{option} is not given: {text}", type="linelist")

@@ -452,7 +452,7 @@ def test_rounding_of_weights_far_out_is_no_difference(seed: int, tmp_path: Path)
 
 
 DECLARED = [
-    ("weight that is taken off", "a.xml:{}: The attribute 'gravcomp' found in a 'body' tag is unsupported.",
+    ("gravity compensation", "a.xml:{}: The attribute 'gravcomp' found in a 'body' tag is unsupported.",
      {"gravity", "bias"}),
     ("gravity switched off", "a.xml:{}: The tag 'flag' found as a child of 'option' is currently unsupported.",
      {"gravity", "bias", "energy"}),

@@ -29,7 +29,7 @@ def test_there_are_many_features_and_each_has_a_name() -> None:
 
 FAULTS_OF_MUJOCO = (
     "URDF: mesh of a package", "URDF: shape of a link without mass", "URDF: largest force of 0",
-    "weight that actuators take off, of which there are none", "armature of a tendon across branches",
+    "gravity compensation by actuators, of which there are none", "armature of a tendon across branches",
 )  # fmt: skip
 """It asks for packages nobody, gives such a link the mass of its shapes, takes such a force for none, lets weight act
 that no actuator is there to take off, and keeps of a tendon's armature what joints of one branch have of each

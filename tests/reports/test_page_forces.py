@@ -87,7 +87,7 @@ def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> Non
     bears, idles = wide(run.lam), wide(0.0 * run.lam)
     titles = [axis["title"]["text"] for key, axis in force([bears])["layout"].items() if key.startswith("yaxis")]
     assert [text.partition("<br>")[0] for text in titles] == ["lam floor", "impulse"]
-    assert note("force", [bears]).endswith("Without a force in every run: wall.")
+    assert note("force", [bears]).endswith("Without force in every run: wall.")
     assert (bool(plots("force", [bears])), bool(plots("force", [idles]))) == (True, False)
 
 
@@ -116,7 +116,7 @@ def test_of_many_rows_that_carry_nothing_a_few_are_named(run: Trajectory) -> Non
     rows = {name: np.repeat(getattr(run, name), 601, axis=1) for name in ("gap", "mode")}
     found = trace(replace(run, lam=np.c_[run.lam, np.zeros((len(run.t), 600))], ledger=None, **rows))
     told = note("force", [replace(found, about=found.about | {"contacts": names})])
-    assert told.endswith("Without a force in every run: pair 0, pair 1, pair 2, pair 3, pair 4, pair 5 and 594 more.")
+    assert told.endswith("Without force in every run: pair 0, pair 1, pair 2, pair 3, pair 4, pair 5 and 594 more.")
 
 
 def test_a_bound_of_an_angle_pushes_with_a_torque(tmp_path: Path) -> None:

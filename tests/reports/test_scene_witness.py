@@ -92,7 +92,7 @@ def test_a_witness_is_given_as_many_steps_as_its_time_allows(
 def test_where_there_is_no_witness_the_truth_says_why(arm: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(judging, "estimated", lambda *_: (2e4, 10))
     said = judging.truth_of(arm).source
-    assert "they share the equations of the mechanism alone (Pinocchio would share the scene alone, and take" in said
+    assert "they share only the equations of the mechanism (Pinocchio would share the scene alone, and take" in said
 
     monkeypatch.setattr(judging, "estimated", lambda *_: (1.0, 10))
     long = replace(arm, t_end=500.0)  # its first part seemed cheap: a thousand steps are all that it is given
