@@ -119,6 +119,14 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """One entry of the navigation: the name of a page, and what to call it."""
+
+    page: str
+    title: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
     """One page.
 
@@ -129,6 +137,7 @@ class Page:
         lead: one line below the heading.
         word: the verdict in few words, for the name of the window.
         engines: label and style of every engine that can be shown and hidden on it.
+        beside: the pages before and after it, if it is one of a row.
     """
 
     name: str
@@ -137,14 +146,7 @@ class Page:
     lead: str = ""
     word: str = ""
     engines: Sequence[Mapping[str, Any]] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Link:
-    """One entry of the navigation: the name of a page, and what to call it."""
-
-    page: str
-    title: str
+    beside: tuple[Link | None, Link | None] = (None, None)
 
 
 @cache

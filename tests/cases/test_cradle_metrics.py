@@ -106,7 +106,7 @@ def test_a_metric_of_a_case_has_a_name_of_its_own() -> None:
 
 @pytest.mark.parametrize("given", [{}, {"number": len, "signal": len}])
 def test_a_metric_of_a_case_is_one_function(given: dict[str, Any]) -> None:
-    with pytest.raises(InvalidValue, match="has one of number, signal and instants"):
+    with pytest.raises(InvalidValue, match="has exactly one of number, signal and instants"):
         CaseMetric(doc="", **given)
 
 

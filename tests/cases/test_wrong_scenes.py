@@ -93,7 +93,7 @@ ARM, TIP = Body(name="arm"), Body(name="tip", parent="rod")
     ({"gravity": (0.0, 0.0, math.inf)}, "Scene.gravity is .* must be finite"),
     ({"joints": (dataclasses.replace(HINGE, body="bar"),)}, "Joint 'hinge': body is 'bar', which does not exist"),
     ({"bodies": (ROD, dataclasses.replace(TIP, parent="bar"))}, "Body 'tip': parent is 'bar', which does not exist"),
-    ({"bodies": (ROD, TIP), "joints": (Joint(name="free", body="tip", type="free"),)}, "a free joint belongs to"),
+    ({"bodies": (ROD, TIP), "joints": (Joint(name="free", body="tip", type="free"),)}, "a free joint is only possible"),
     ({"bodies": (ROD, ARM), "joints": (Joint(name="x", body="arm", type="slide"), HINGE)}, "the order of the bodies"),
     ({"bodies": (ROD, ARM, TIP)}, "branch by branch"),
 ])  # fmt: skip

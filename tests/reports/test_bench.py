@@ -331,8 +331,8 @@ def test_pairs_beside_which_two_cores_were_given_come_first() -> None:
     ("arguments", "words"),
     [
         (["--against", "nowhere"], "not a folder"),
-        (["--skip", "bouncing_ball"], "scenes of its own"),
-        (["-e", "dart", "delta_impulse", "--variant", "light"], "No engine asked for can run"),
+        (["--skip", "bouncing_ball"], "its own scenes"),
+        (["-e", "dart", "delta_impulse", "--variant", "light"], "None of the selected engines can run"),
         (["--repeats", "0"], "0 is not in the range"),
         (["no_such_case"], "no case"),
     ],

@@ -103,7 +103,7 @@ def test_a_page_and_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert end.value.code == 0
     assert "mujoco 4" in capsys.readouterr().out
     found = json.loads((tmp_path / "out" / "conformance.json").read_text())["rows"]
-    assert {(row["engine"], row["feature"], row["verdict"]) for row in found} == {
+    assert {(row["engine"], row["feature"], row["verdict"]) for row in found} >= {
         ("mujoco", "gravity", OK), ("mujoco", "gravity switched off", OK),
         ("pinocchio", "gravity", WRONG), ("pinocchio", "gravity switched off", WRONG),
     }  # fmt: skip

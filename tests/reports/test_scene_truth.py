@@ -138,7 +138,7 @@ def test_the_horizon_is_the_first_reason_of_all(seed: int) -> None:
     if min(reasons) < 1.0:
         assert found is not None
         assert found.until == pytest.approx(min(reasons), abs=1e-12)
-        words = ("slide", "let", "neighbouring")
+        words = ("sliding", "opens", "neighbouring")
         assert words[np.argmin(reasons)] in found.why
     else:
         assert found is None
