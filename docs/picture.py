@@ -210,11 +210,12 @@ def log_format() -> None:
 
 @drawn
 def cache() -> None:
-    """The first run of an installation, and the next one."""
+    """What the first run of an installation says while it compiles, and what is kept."""
     os.environ["CROSSBODY_CACHE"] = "cache"
-    run = "crossbody run bouncing_ball --variant listing -e reference:compiled --out ball -q"
     try:
-        terminal(sh(run, "crossbody cache", run))
+        command, said, *rest = sh("crossbody run bouncing_ball --variant listing -e reference:compiled").splitlines()
+        counted = [row for row in rest if "compiling the reference" in row]
+        terminal("\n".join([command, counted[0], "…", counted[-1], said, "…", sh("crossbody cache")]))
     finally:
         del os.environ["CROSSBODY_CACHE"]
 

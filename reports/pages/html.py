@@ -26,7 +26,7 @@ import jinja2
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.bccache import Bucket, BytecodeCache
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from crossbody.cases import OutputError
@@ -57,6 +57,11 @@ UNITLESS = re.compile(r"(<br>|\s)*\[1\]$")  # what a number without a unit would
 def packed_text(text: str) -> str:
     """A text as base64 of gzip."""
     return _folded(text.encode())
+
+
+def breakable(text: str) -> Markup:
+    """A name that a narrow column may break behind its colons and underscores."""
+    return Markup(re.sub("([:_])", r"\1<wbr>", str(escape(text))))
 
 
 def packed_value(value: Any) -> str:
@@ -159,6 +164,7 @@ def environment() -> Environment:
     )  # fmt: skip
     made.filters |= {
         "number": number,
+        "breakable": breakable,
         "bounded": bounded,
         "slug": slug,
         "told": told,
