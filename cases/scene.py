@@ -236,7 +236,9 @@ class Shape(_Named):
         _Named.__post_init__(self)
         what = f"Shape {self.name!r}"
         if (self.type == "hull") != bool(self.corners):
-            raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; only a hull has them.")
+            raise SceneError(
+                f"{what} of type {self.type!r} has {len(self.corners)} corners; only a hull has corners, and needs them."
+            )
         found = tuple(_vector(f"{what}: corner {k}", corner, 3) for k, corner in enumerate(self.corners))
         object.__setattr__(self, "corners", found)
         if found and not _thickness(found) > FLAT:
@@ -534,7 +536,7 @@ class Scene:
                 raise SceneError(f"Joint {joint.name!r}: a free joint is only possible for a child of the world.")
         places = [seen[joint.body] for joint in self.joints]
         if places != sorted(places):
-            raise SceneError("Scene.joints must stand in the order of the bodies.")
+            raise SceneError("Scene.joints must be in the order of the bodies.")
 
     def replace(self, **changes: Any) -> Scene:
         """Return a copy with other parts."""

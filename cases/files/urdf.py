@@ -32,7 +32,7 @@ def parsed(path: Path) -> ElementTree.Element:
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
-        raise SceneError(f"{path} is no XML: {error}.") from None
+        raise SceneError(f"{path} is not XML: {error}.") from None
     if root.tag != "robot":
         raise SceneError(f"{path} has the root <{root.tag}>; a URDF has <robot>.")
     return root

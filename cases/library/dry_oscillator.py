@@ -114,7 +114,7 @@ VARIANTS: dict[str, dict[str, Value]] = {
 _TITLES = {
     "swings": "a mass on a spring swings in a guide with dry friction until it sticks",
     "stops": "a body slides in a guide with dry friction and stops",
-    "holds": "dry friction holds a spring that pulls",
+    "holds": "dry friction holds against a spring",
 }
 
 

@@ -24,7 +24,7 @@ class _Robot:
         "keyframes": "Newton has no keyframes.",
     }  # fmt: skip
     unseen = {  # noqa: RUF012
-        "energy": "Newton tells no energy.", "tendons": "Newton keeps tendons only for its MuJoCo solver.",
+        "energy": "Newton does not report energy.", "tendons": "Newton keeps tendons only for its MuJoCo solver.",
         "surfaces": "Newton's solvers mix the friction of two shapes, each in its own way.",
         "softness": "Newton keeps solref only for its MuJoCo solver.",
     }  # fmt: skip

@@ -23,7 +23,7 @@ class _Robot:
         "tendons": "PyBullet has no tendons.", "softness": "PyBullet's rows have no solref.",
     }  # fmt: skip
     unseen = {  # noqa: RUF012
-        "energy": "PyBullet tells no energy.",
+        "energy": "PyBullet does not report energy.",
         "contacts": "PyBullet does not report which of its shapes may touch.",
         "surfaces": "PyBullet does not report which of its shapes may touch.",
     }  # fmt: skip

@@ -68,8 +68,8 @@ OF_FORCE = 1.5
 """Time constants of what answers to a force that a step may be long: Runge-Kutta 4 is stable up to 2.8."""
 SOFT = "The file's rows are soft: their law varies with depth."
 OWN_CONTACTS = (
-    "MuJoCo has no row for what this case has beside its shapes, as rolling on the face of a "
-    "ring: what its own contacts make of the shapes is the profile default."
+    "MuJoCo has no row for parts of this case that are not shapes, such as rolling on the face of "
+    "a ring; its own contacts are the profile default."
 )
 HIDDEN = "MuJoCo has a row for a bound only while it acts."
 

@@ -156,7 +156,9 @@ def rows_of(
     if row % BLOCK_MESSAGES:
         yield _arrays(path, kept, types, row)
     if group.rows is not None and row != group.rows:
-        raise LogFormatError(path, f"announces {group.rows} messages on {group.name!r} and holds {row}: cut off?", row)
+        raise LogFormatError(
+            path, f"announces {group.rows} messages on {group.name!r} and holds {row}: truncated?", row
+        )
 
 
 def _value(path: Path, row: int, message: Any, leaf: Leaf) -> Any:

@@ -243,7 +243,7 @@ def _check(
     path: Path, row: int, names: Sequence[str], cells: Sequence[str], columns: Sequence[str], decimal: str
 ) -> LogFormatError | None:
     if len(cells) != len(names):
-        return LogFormatError(path, f"the line has {len(cells)} cells, the header {len(names)}: cut off?", row)
+        return LogFormatError(path, f"the line has {len(cells)} cells, the header {len(names)}: truncated?", row)
     for name, cell in zip(names, cells, strict=True):
         if name in columns and not _is_numeric_cell(cell, decimal):
             kind = "a formula" if cell.lstrip().startswith(FORMULA) else "text"

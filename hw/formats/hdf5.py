@@ -169,9 +169,9 @@ def _missing(item: Any) -> str:
     if item.external or item.is_virtual:
         return "keeps its numbers in another file"
     if item.chunks and item.id.get_num_chunks() < _chunks(item):
-        return "is declared but not written in full: cut off?"
+        return "is declared but not written in full: truncated?"
     if not item.chunks and item.size and not item.id.get_storage_size():
-        return "is declared but never written: cut off?"
+        return "is declared but never written: truncated?"
     return ""
 
 

@@ -100,7 +100,9 @@ class McapReader:
                 if told and first.keys() >= told.keys():
                     return told, first
         for topic in told.keys() - first.keys():
-            raise LogFormatError(self._path, f"announces {told[topic]} messages on {topic!r} and holds none: cut off?")
+            raise LogFormatError(
+                self._path, f"announces {told[topic]} messages on {topic!r} and holds none: truncated?"
+            )
         return counts, first
 
     def _told(self) -> dict[str, int]:
@@ -214,7 +216,7 @@ def records(file: Any, path: Path, budget: Budget, at: int = len(MAGIC)) -> Iter
         opcode, length = RECORD.unpack(file.read(RECORD.size))
         if opcode == 0 or length > end - at - RECORD.size:
             raise LogFormatError(
-                path, "has an invalid record, or one that extends beyond its end: cut off? `mcap recover` helps."
+                path, "has an invalid record, or one that extends beyond its end: truncated? `mcap recover` helps."
             )
         if opcode == CHUNK and length >= SIZES.size:
             budget.hold(2 * SIZES.unpack(file.read(SIZES.size))[2], "a chunk and its messages")

@@ -105,7 +105,9 @@ def check_held(system: System, *, driven: bool = False) -> None:
         SceneError: if a controller in Python gives its inputs, or some of them are activations.
     """
     if system.activations is not None and not driven:
-        raise SceneError("Actuators with an activation have a state beside q and v: only linearise knows it.")
+        raise SceneError(
+            "Actuators with an activation have a state in addition to q and v, which only linearise supports."
+        )
     if isinstance(system.control, Control):
         raise SceneError(
             f"System.control is the controller {system.control.label} in Python, which has no derivatives; "

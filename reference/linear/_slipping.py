@@ -48,8 +48,8 @@ AS_ONE = (
     "the motion then depends on which comes first, so there is no derivative."
 )
 TURNS_BACK = (
-    "sensitivity: the slip of row {i} turns back through zero at t = {t:.9g} s; beside this "
-    "motion it turns round in space instead, so that there is no derivative."
+    "sensitivity: the slip of row {i} turns back through zero at t = {t:.9g} s; in neighbouring "
+    "motions it turns round in space instead, so that there is no derivative."
 )
 TOO_SHORT = (
     "sensitivity: row {i} slides at t = {t:.9g} s for so short a time that the direction of "

@@ -101,7 +101,7 @@ def _counted(_repeats: int) -> Iterator[Row]:
     for what, count, limit, beside, how in (
         ("guard evaluations of a scene without rows", bare["guards"], 0.0, f"{bare['steps']} steps",
          "no contacts, no guards"),
-        ("guard evaluations beside the gaps of each step, where no row opens", past, 0.0, f"{closed['steps']} steps",
+        ("guard evaluations besides the gaps of each step, where no row opens", past, 0.0, f"{closed['steps']} steps",
          "no contact, no guard"),
         ("right-hand sides of 5 s in free flight", flown["rhs"], 20.0, in_form[0], "free flight in closed form"),
         ("right-hand sides of a ball on a linear floor", bounced["rhs"], None, in_form[1],

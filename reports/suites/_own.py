@@ -216,7 +216,7 @@ SUITES: Mapping[str, Suite] = {
     # Its truth is exact between events and looks for them in a way of its own. Contacts of stiff walls multiply an
     # error: where the scene beside it parts from it by as much, a run is judged up to there.
     "springs_and_walls": Suite(
-        about="Masses on springs beside one to three walls: a catch or a release in a window of any width, somewhere "
+        about="Masses on springs near one to three walls: a touch or a release in a window of any width, somewhere "
         "in a step.",
         runs=200, engines=("reference:compiled",),
         families=(

@@ -1,4 +1,4 @@
-"""A case drawn at random: masses on springs beside walls, M q'' = g - K q with gaps H q + c, started outside of all.
+"""A case drawn at random: masses on springs near walls, M q'' = g - K q with gaps H q + c, started outside of all.
 
 M, K and H are constant, so that its truth needs no integrator (`_linear_arcs`).
 """
@@ -123,7 +123,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     law = Law(a0=a0, a1=a1, a2=np.zeros(len(a0)), unilateral=np.ones(len(a0), dtype=np.bool_))
     t_end = float(parameters["t_end"])
     return Case(
-        name="springs_and_walls", variant=variant, title="masses on springs beside walls", mechanism=__file__,
+        name="springs_and_walls", variant=variant, title="masses on springs near walls", mechanism=__file__,
         parameters=parameters, coordinates=tuple(Coordinate(name=f"q{i}", unit="m") for i in range(len(x.M))),
         contacts=tuple(f"wall {i}" for i in range(len(a0))), q0=x.q0, v0=x.v0, t_end=t_end, law=law,
         closed_form=LinearArcs(x.M, x.K, x.g, x.H, x.c, x.q0, x.v0, a0, a1, t_end),

@@ -39,7 +39,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     ):
         group.addoption(f"--crossbody-{option}", action="append", default=[], metavar=word, help=text)
         parser.addini(f"crossbody_{option}s", f"where --crossbody-{option} is not given: {text}", type="linelist")
-    plugin = "a Python file that is an engine, a metric, a case, ...; repeatable, beside [tool.crossbody] plugins"
+    plugin = (
+        "a Python file that is an engine, a metric, a case, ...; repeatable, in addition to [tool.crossbody] plugins"
+    )
     group.addoption("--crossbody-plugin", action="append", default=[], metavar="FILE", help=plugin)
     group.addoption("--crossbody-update", action="store_true", help="write baselines instead of comparing with them")
 

@@ -43,7 +43,7 @@ range = [-90, 90]
         (("delay = 8.8e-4", "delay = inf"), "$.coordinates.q11.delay", "finite"),
         (("range = [-90, 90]", "range = [90, -90]"), "$.coordinates.q11.range", "below"),
         (("range = [-90, 90]", "range = [1, 2, 3]"), "$.coordinates.q11.range", "length"),
-        (("unit = \"deg\"", "unit = \"dgree\""), "$.coordinates.q11.unit", "no unit"),
+        (("unit = \"deg\"", "unit = \"dgree\""), "$.coordinates.q11.unit", "not a unit"),
         (("unit = \"ms\"", "unit = \"mm\""), "$.time.unit", "must measure [s]"),
         (("sample_time = 8.8e-4", "sample_time = 0"), "$.time.sample_time", "above 0"),
         (("unit = \"ms\"\nsample_time = 8.8e-4", "unit = \"sample\""), "$.time.sample_time", "missing"),

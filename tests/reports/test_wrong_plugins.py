@@ -89,7 +89,7 @@ def test_what_lacks_one_name_of_its_kind_is_told_which(
     told = sentence(capsys, "list", "--plugin", "mine.py")
     kind = KINDS[group]
     also = f"{name} ({kind.defines[name].valid})"
-    assert told.endswith(f"mine.py is no plug-in yet: a {kind.name} also defines {also}.\n")
+    assert told.endswith(f"mine.py is not yet a plug-in: a {kind.name} also defines {also}.\n")
 
 
 def test_a_case_file_is_checked_as_a_plug_in_is(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -93,7 +93,7 @@ def features() -> list[Feature]:
         Feature("bounds of a slide",
             mjcf(elbow='<joint name="elbow" type="slide" axis="1 0 0" range="-.2 .3" limited="true"/>'),
             arm(elbow={"type": "slide", "range": (-0.2, 0.3)}), ".//joint[@type='slide'][@range]", about=("limits",)),
-        elbow("bounds beside a reference", 'range="-30 60" ref="20"', ".//joint[@ref][@range]",
+        elbow("bounds with a reference", 'range="-30 60" ref="20"', ".//joint[@ref][@range]",
             {"range": (-30 * turn, 60 * turn), "reference": 20 * turn}, "limits",
             "A range refers to the coordinate, which is ref in the pose of the file.", "Leave ref out."),
         Feature("bounds of an outer class",

@@ -94,7 +94,7 @@ def features() -> list[Feature]:
             ".//geom[@fromto]"),
         of("orientation of a geom", '<geom type="box" size=".05 .1 .15" pos="0 .02 -.15" euler="40 0 0"/>',
             weighing(leaning), ".//geom[@euler] | .//geom[@quat]"),
-        of("geoms beside an inertial", LOWER_INERTIAL + '<geom type="box" size=".05 .1 .15"/>', {},
+        of("geoms together with an inertial", LOWER_INERTIAL + '<geom type="box" size=".05 .1 .15"/>', {},
             ".//inertial/../geom", rule="An <inertial> takes precedence over geoms."),
         of("geoms of some groups",
             '<geom type="sphere" size=".1" pos="0 0 -.1" group="1"/><geom type="box" size=".05 .1 .15" group="3"/>',

@@ -58,7 +58,7 @@ def features() -> list[Feature]:
             rule="A body without joints is part of its parent."),
         Feature("frame", mjcf(inside='<frame pos="0 0 -.1" euler="0 0 90">',
             behind="").replace("</body>\n    </body>", "</body></frame>\n    </body>"), arm(lower={"position": (-0.05,
-            0.0, -0.5)} | turned(("z", 90))), ".//frame", "A <frame> moves what stands in it.",
+            0.0, -0.5)} | turned(("z", 90))), ".//frame", "A <frame> moves its contents.",
             "Merge its pose into those of its contents."),
         Feature("included file", mjcf(inside="", lower_inertial='<include file="part.xml"/>'), arm(), ".//include",
             "The content of a file is placed where it is included.", "Write one file.",
