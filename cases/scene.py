@@ -236,9 +236,7 @@ class Shape(_Named):
         _Named.__post_init__(self)
         what = f"Shape {self.name!r}"
         if (self.type == "hull") != bool(self.corners):
-            raise SceneError(
-                f"{what} of type {self.type!r} has {len(self.corners)} corners; only a hull has corners, and needs them."
-            )
+            raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; only a hull has any.")
         found = tuple(_vector(f"{what}: corner {k}", corner, 3) for k, corner in enumerate(self.corners))
         object.__setattr__(self, "corners", found)
         if found and not _thickness(found) > FLAT:

@@ -385,7 +385,7 @@ COLLADA = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1e-9)), "4 corners that lie in a plane"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.inf)), "must be finite"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.nan)), "corner 3 is .* must be 3 numbers"),
-     (((0.0, 0.0), (1.0, 0.0)), "corner 0 is .* must be 3 numbers"), ((), "only a hull has corners")],
+     (((0.0, 0.0), (1.0, 0.0)), "corner 0 is .* must be 3 numbers"), ((), "only a hull has any")],
 )  # fmt: skip
 def test_a_hull_that_is_none_is_refused(corners: Any, told: str) -> None:
     with pytest.raises(SceneError, match=told):
@@ -393,7 +393,7 @@ def test_a_hull_that_is_none_is_refused(corners: Any, told: str) -> None:
 
 
 def test_corners_of_another_shape_are_refused() -> None:
-    with pytest.raises(SceneError, match="only a hull has corners"):
+    with pytest.raises(SceneError, match="only a hull has any"):
         Shape(name="box", type="box", size=(1.0, 1.0, 1.0), corners=((0.0, 0.0, 0.0),) * 4)
 
 
