@@ -124,7 +124,7 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
     shared = "equations, integrator and event location" if tier is Tier.D else "only the equations of the mechanism"
     second = _witness(case, OF_WITNESS * budget) if case.general and tier is Tier.C and not rubs else None
     if isinstance(second, Trajectory):
-        who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "the scene alone"
+        who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "only the scene"
     else:
         why = f" ({second})" if second else why
         limit = OF_WITNESS * budget if case.general and tier is Tier.C else math.inf

@@ -292,7 +292,7 @@ def test_a_version_that_was_not_tried_is_told() -> None:
     class Module:
         PACKAGE, TRIED = "numpy", ("0.1", "0.2")
 
-    assert "was tried with 0.1 to 0.2" in tried(Module)
+    assert "was tested with 0.1 to 0.2" in tried(Module)
     Module.TRIED = ("0.1", "99.0")
     assert tried(Module) == ""
 
