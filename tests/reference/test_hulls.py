@@ -381,8 +381,8 @@ COLLADA = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11
 
 @pytest.mark.parametrize(
     ("corners", "told"),
-    [(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "3 corners that lie in a plane"),
-     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1e-9)), "4 corners that lie in a plane"),
+    [(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "3 corners that lie in one plane"),
+     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1e-9)), "4 corners that lie in one plane"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.inf)), "must be finite"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.nan)), "corner 3 is .* must be 3 numbers"),
      (((0.0, 0.0), (1.0, 0.0)), "corner 0 is .* must be 3 numbers"), ((), "only a hull has any")],
