@@ -1,4 +1,4 @@
-"""Recorded modes against those that the recorded events leave: an identity at every sample."""
+"""Recorded modes against those that follow from the recorded events: an identity at every sample."""
 
 from __future__ import annotations
 

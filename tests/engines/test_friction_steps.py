@@ -165,7 +165,7 @@ def test_multipliers_explain_the_motion(name: str, profile: str, thrown: Case) -
     if (name, profile) == ("drake", "default") and len(thrown.contacts) > 3:
         return
     if (name == "dart") and (why := engine(name).why_not(thrown, profile)):
-        assert "cylinder" in why or "FCL's detector takes the capsule" in why
+        assert "cylinder" in why or "FCL's detector treats the capsule" in why
         return
     found = ran(name, profile, thrown, dt=1e-4)
     system, worst, largest = system_of(thrown), 0.0, 0.0

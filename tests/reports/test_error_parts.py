@@ -454,7 +454,7 @@ def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: p
     told.append(jobs.run_case(swing, [pick], truth=None).entries[0].study)
     assert [study is not None and len(study.runs) > 1 for study in told] == [True, False]
     assert told[1] is not None
-    assert "Runs with other dt that tell it would take about" in told[1].why
+    assert "The runs with other dt that are needed would take about" in told[1].why
 
 
 def test_a_study_has_as_many_steps_as_there_is_time_for(monkeypatch: pytest.MonkeyPatch) -> None:
