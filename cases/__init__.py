@@ -183,7 +183,7 @@ def from_file(
     from crossbody.cases.files.controls import under
 
     if "tick" in overrides:
-        raise InvalidValue("from_file: tick is given beside a Control, which has its own; valid: one of them.")
+        raise InvalidValue("from_file: tick is given together with a Control, which has its own; valid: one of them.")
     return under(load(fspath(path), key, **overrides), control)
 
 

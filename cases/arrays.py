@@ -29,7 +29,7 @@ def numbers(owner: str, field: str, value: Any, dtype: DTypeLike = np.float64) -
         return np.array(value, order="C")
     try:
         if np.iscomplexobj(value) or np.asarray(value).dtype.kind in "US":
-            raise TypeError("complex numbers and texts are not admitted")
+            raise TypeError("complex numbers and text are not allowed")
         with np.errstate(all="raise"):  # a number that is no integer is not cut to one in silence
             return np.array(value, dtype=dtype, order="C")
     except (TypeError, ValueError, OverflowError, FloatingPointError) as error:

@@ -375,9 +375,7 @@ class Case:
             raise InvalidValue(f"Case {self.name}: t_end is {self.t_end}; it must be finite and above 0 s.")
         for name, part in (("a force", self.force), ("gates", self.gates)):
             if part is not None and (self.general or self.scene is None):
-                what = (
-                    "is no scene" if self.scene is None else "has no kernels of its own, in which the reference has it"
-                )
+                what = "is no scene" if self.scene is None else "has no kernels of its own"
                 raise SceneError(f"Case {self.name} has {name} but {what}.")
         self._put_control()
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
@@ -390,7 +388,7 @@ class Case:
         if control is None:
             return
         if scene is None or not scene.actuators:
-            what = "is no scene, for which alone there is one" if scene is None else "has no actuators"
+            what = "is not a scene" if scene is None else "has no actuators"
             raise SceneError(f"Case {self.name} has a control but {what}.")
         if inputs is not None and inputs.values[:, : len(scene.actuators)].any():
             raise SceneError(f"Case {self.name}: inputs hold controls, and there is a control; valid: one of them.")
@@ -456,4 +454,6 @@ class CaseMetric:
         """Check that there is one function."""
         given = [name for name in ("number", "signal", "instants") if getattr(self, name) is not None]
         if len(given) != 1:
-            raise InvalidValue(f"A metric of a case has one of number, signal and instants; given: {given or 'none'}.")
+            raise InvalidValue(
+                f"A metric of a case has exactly one of number, signal and instants; given: {given or 'none'}."
+            )

@@ -15,33 +15,34 @@ _TOLERANCE = "a thousand times the default tolerance of 1e-9: errors grow from e
 _FASTER = "a thousand times the default tolerance of 1e-9, times the ratio of the fastest rate to the motion's"
 _IDENTITY = "an identity at every sample: rounding"
 _COUNT = "a count"
-_ON_THE_GRID = "impacts on the grid of the steps: the way of one of them"
-_FOUND_LATE = "a contact is found where a step begins and pushes until its end: the ways of two"
-_LOCATED = "located events: rounding, and the tolerance of a root by its rate"
+_ON_THE_GRID = "impacts on the grid of steps: the distance moved in one step"
+_FOUND_LATE = "a contact is found at the start of a step and pushes until its end: the distance moved in two steps"
+_LOCATED = "located events: rounding, and the tolerance of a root times its rate"
 _LOCATING = (
     ("reference", "*"), ("mujoco", "matched"), ("pinocchio", "law"), ("pinocchio", "impulse"),
     ("pinocchio", "impulse_simultaneous"), ("exudyn", "*"),
 )  # fmt: skip
 """Engines and profiles whose events are located between their steps."""
-_SAMPLED = "the trapezoidal rule between a run's own samples; an impact inside a step costs half its way"
+_SAMPLED = (
+    "the trapezoidal rule between a run's own samples; an impact inside a step causes an error of half "
+    "the distance moved in it"
+)
 _OF_MUJOCO = (
     "MuJoCo's own pyramids, soft contacts and step: friction creeps where it holds, pushes "
     "off the slip where it slides, and lifts what slides fast"
 )
-_RIGID = (
-    "rigid contacts on a grid of steps: friction begins and ends with a step, and so does what it makes of a velocity"
-)
+_RIGID = "rigid contacts on a grid of steps: friction, and its effect on velocities, begins and ends with a step"
 _BOUNDED = f"{_RIGID}; its friction is bounded along two axes, not in a cone"
 KNOWN = {
     ("mujoco", "default"): _OF_MUJOCO,
     ("pinocchio", "admm"): _RIGID,
     ("drake", "matched"): "stiff contacts on a grid of steps, and friction as a steep function of the slip",
     ("drake", "default"): (
-        "soft contacts, one a pair of solids, where they are deepest; friction as a function "
-        "of the slip, and the normal force of the step before"
+        "soft contacts, one per pair of solids, at the deepest point; friction as a function of the slip and "
+        "of the previous normal force"
     ),
     ("dart", "matched"): _BOUNDED,
-    ("dart", "default"): f"{_BOUNDED}, and what rests is put to sleep",
+    ("dart", "default"): f"{_BOUNDED}, and bodies at rest are put to sleep",
 }
 _FRICTION = tuple(
     Limit(metric="*", engine=engine, profile=profile, covers_none=True, known=known)
@@ -65,7 +66,7 @@ def default_limits(case: Case) -> tuple[Limit, ...]:
 
 
 def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
-    yield "start_error", 1e-12, "the case's own numbers, put into an engine's coordinates and back: rounding"
+    yield "start_error", 1e-12, "the case's own numbers, converted to an engine's coordinates and back: rounding"
     yield "position", 1e-6, _TOLERANCE
     yield "velocity", 1e-5, _FASTER
     yield "energy_drift", 1e-6, _TOLERANCE
@@ -82,7 +83,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     if case.law.unilateral.any():
         yield "gap_error", 1e-6, _TOLERANCE
         yield "event_gap", 1.0, _ON_THE_GRID
-        yield "complementarity", 1e-6, "contacts push only, to the precision of the released instant"
+        yield "complementarity", 1e-6, "contacts only push, to the precision of the instant of release"
         yield "event_times", 1e-6, _TOLERANCE
         yield "mode_times", 1e-6, _TOLERANCE
         yield "touch_count", 0.0, _COUNT
@@ -90,10 +91,10 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     if case.rubs:
         yield "stick_times", 1e-6, _TOLERANCE
         yield "slip_times", 1e-6, _TOLERANCE
-        yield "cone_violation", 1e-6, "friction is at most mu times the normal force, to what rows that stick are off"
-        yield "friction_angle", 1e-6, "friction is against the slip, to the precision of its direction"
+        yield "cone_violation", 1e-6, "friction is at most mu times the normal force, to the error of sticking rows"
+        yield "friction_angle", 1e-6, "friction opposes the slip, to the precision of its direction"
     if (~case.law.unilateral & (case.law.a0 > 0.0)).any():
-        yield "constraint_drift", 1e-8, "the law draws closures back at its own rate"
+        yield "constraint_drift", 1e-8, "the law corrects closures at its own rate"
 
 
 def limits_of(case: Case) -> tuple[Limit, ...]:
@@ -103,17 +104,20 @@ def limits_of(case: Case) -> tuple[Limit, ...]:
 
 MEMORYLESS = (
     "The law as a force of the state has no memory: it ends at h = 0, has no ballistic state "
-    "and makes no energy where the law does."
+    "and makes no energy, unlike the law."
 )
-SPRINGS = "Springs and dampers that push below the surface, not the case's law: weight presses them in, uncancelled."
+SPRINGS = (
+    "Springs and dampers below the surface, not the case's law: they yield under the weight, which is not cancelled."
+)
 PLANT = (
-    "A MultibodyPlant's point contact is a spring without the law's damping and cubic term, and weight presses it in."
+    "A MultibodyPlant's point contact is a spring without the law's damping and cubic term, which yields "
+    "under the weight."
 )
 DISCRETE = (
     "The discrete plant regularises contact with a dissipation time of two steps: it takes energy out of every bounce."
 )
 IMPACT = "Time stepping on rigid contacts: impacts on the grid, and a restitution instead of the law."
-GAMES = "Made for games: overlap is allowed, impacts come on a grid of 1/60 s, and a restitution stands for the law."
+GAMES = "Made for games: overlap is allowed, impacts come on a grid of 1/60 s, and a restitution replaces the law."
 TOGETHER = (
     "Every pair pushes as if it were alone: balls that touch are a chain of springs, whose "
     "collisions overlap, not one collision after another."

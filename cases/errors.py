@@ -199,13 +199,17 @@ _ADVICE = {
     Outcome.STEP_LIMIT: "Raise max_steps, loosen the tolerance, or check whether events accumulate (Zeno).",
     Outcome.TIME_LIMIT: "Raise the time limit, or loosen the tolerance.",
     Outcome.STEP_TOO_SMALL: "The step fell below the resolution of time: loosen the tolerance or lower the stiffness.",
-    Outcome.DIVERGED: "The motion left every sensible bound: take a smaller step, or check signs and constants.",
-    Outcome.NOT_FINITE: "A kernel or controller returned NaN or infinity: look at the state named with this outcome.",
+    Outcome.DIVERGED: "The motion exceeded all plausible bounds: take a smaller step, or check signs and constants.",
+    Outcome.NOT_FINITE: "A kernel or controller returned NaN or infinity: examine the state named with this outcome.",
     Outcome.ILL_POSED: "The active rows or the mass matrix lost rank: the multipliers are not unique here.",
-    Outcome.MODE_CYCLE: "The contacts named with this outcome switch for ever at one instant: their laws contradict.",
+    Outcome.MODE_CYCLE: (
+        "The contacts named with this outcome switch forever at one instant: their laws contradict each other."
+    ),
     Outcome.LOST: "The motion left the region in which its controller holds: start closer, or change the controller.",
-    Outcome.INCONSISTENT: "The results contradict the model, in the quantity that is named with this outcome.",
-    Outcome.PAINLEVE: "A force at a sliding contact would press it further in (Painleve): rigid bodies have no motion.",
+    Outcome.INCONSISTENT: "The results contradict the model in the quantity named with this outcome.",
+    Outcome.PAINLEVE: (
+        "A force at a sliding contact would press it in further (Painleve): no motion of rigid bodies exists."
+    ),
     Outcome.NO_CONSISTENT_MODES: "No set of sticking and sliding contacts is consistent with the resulting forces.",
     Outcome.INTERRUPTED: "The run was interrupted; what was computed until then is kept.",
 }

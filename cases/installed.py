@@ -88,7 +88,7 @@ def _opened(path: Path) -> ModuleType:
     if not os.path.isfile(path):
         raise NoFile("plug-in file", path)
     if same := [other for other in _FILES if other.stem == path.stem]:
-        raise InvalidValue(f"The plug-ins {same[0]} and {path} have one name: rename one of the files.")
+        raise InvalidValue(f"The plug-ins {same[0]} and {path} have the same name: rename one of the files.")
     module = from_file("plugin", path)
     try:
         _check(path, module)
@@ -105,7 +105,7 @@ def _check(path: Path, module: ModuleType) -> None:
         package = f"{group}.library" if group == "crossbody.cases" else group
         taken = find_spec(f"{package}.{path.stem}") or path.stem in getattr(sys.modules[package], "OWN", ())
         if taken or path.stem in _entry_points(group):
-            raise InvalidValue(f"The {KINDS[group].name} {path.stem!r} is there already: rename the plug-in {path}.")
+            raise InvalidValue(f"The {KINDS[group].name} {path.stem!r} already exists: rename the plug-in {path}.")
         check(module, group)
 
 

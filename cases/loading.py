@@ -44,7 +44,7 @@ def module(name: str) -> Any:
     if not name.endswith(".py"):
         if name not in cases.names() and (os.path.exists(name) or os.path.splitext(name)[1]):
             endings = ", ".join(OF_USERS)
-            raise InvalidValue(f"The case {shown(name)} is no case file; the path of one ends in {endings}.")
+            raise InvalidValue(f"The case {shown(name)} is not a case file; its path must end in {endings}.")
         return cases.REGISTRY.load(name)
     found = from_file("case", Path(name), cases.names())
     check(found, "crossbody.cases")

@@ -124,7 +124,7 @@ def what_is_missing(module: ModuleType) -> str:
     absent = {name: kind.defines[name].valid for name in lacking(module, kind)}
     if 2 * len(absent) <= len(kind.defines):
         told = "; ".join(f"{name} ({valid})" for name, valid in absent.items())
-        return f"is no plug-in yet: a {kind.name} also defines {told}."
+        return f"is not yet a plug-in: a {kind.name} also defines {told}."
     wanted = "; ".join(f"{kind.name}: {', '.join(kind.defines)}" for kind in KINDS.values())
     return f"defines none. Public names of a plug-in, by its kind: {wanted}."
 

@@ -197,8 +197,7 @@ class Joint(_Named):
         if low > 0.0 or not high > max(self.margin, 0.0):
             raise SceneError(
                 f"Joint {self.name!r}: range is {list(self.range)} and margin {self.margin:g}; "
-                "a ball joint has 0 and its largest angle, rad, above the margin: at no angle "
-                "nothing says which way is back."
+                "a ball joint has 0 and its largest angle, rad, above the margin: at angle zero there is no direction."
             )
         object.__setattr__(self, "range", (-math.inf, high))
 
@@ -237,11 +236,13 @@ class Shape(_Named):
         _Named.__post_init__(self)
         what = f"Shape {self.name!r}"
         if (self.type == "hull") != bool(self.corners):
-            raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; a hull alone has them.")
+            raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; only a hull has any.")
         found = tuple(_vector(f"{what}: corner {k}", corner, 3) for k, corner in enumerate(self.corners))
         object.__setattr__(self, "corners", found)
         if found and not _thickness(found) > FLAT:
-            raise SceneError(f"{what} has {len(found)} corners that lie in a plane; a hull has four that do not.")
+            raise SceneError(
+                f"{what} has {len(found)} corners that lie in one plane; a hull has at least four that do not."
+            )
 
     @property
     def extents(self) -> Floats:
@@ -439,16 +440,12 @@ class Actuator(_Named):
                 f"{what}: activation is {shown(self.activation)}; valid: {', '.join(ACTIVATIONS)}, or none."
             )
         if (self.activation == "filter") != (0.0 < self.time_constant < math.inf):
-            raise SceneError(
-                f"{what}: time_constant is {shown(self.time_constant)}; a filter alone has one, above 0 s."
-            )
+            raise SceneError(f"{what}: time_constant is {shown(self.time_constant)}; only a filter has one, above 0 s.")
         object.__setattr__(self, "gear", _vector(f"{what}: gear", self.gear, np.size(self.gear)))
         if not all(math.isfinite(gear * gear) for gear in self.gear):  # inertia at a joint goes by it
             raise SceneError(f"{what}: gear is {shown(self.gear)}; valid: numbers whose squares are finite.")
         if self.tendon and self.armature:
-            raise SceneError(
-                f"Actuator {self.name!r} has armature on a tendon, which would join branches in M: not done."
-            )
+            raise SceneError(f"Actuator {self.name!r} has armature on a tendon, which is not supported.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -527,17 +524,17 @@ class Scene:
                 branch.pop()
             if body.parent and not branch:
                 raise SceneError(
-                    f"Body {body.name!r} hangs on {body.parent!r}, whose branch has ended before it: "
+                    f"Body {body.name!r} is a child of {body.parent!r}, whose branch has ended before it: "
                     "Scene.bodies must stand branch by branch (depth-first)."
                 )
             branch.append(body.name)
         for joint in self.joints:
             _known(joint, "body", joint.body, set(seen) - {""})
             if joint.type == "free" and self.bodies[seen[joint.body]].parent:
-                raise SceneError(f"Joint {joint.name!r}: a free joint belongs to a body of the world.")
+                raise SceneError(f"Joint {joint.name!r}: a free joint is only possible for a child of the world.")
         places = [seen[joint.body] for joint in self.joints]
         if places != sorted(places):
-            raise SceneError("Scene.joints must stand in the order of the bodies.")
+            raise SceneError("Scene.joints must be in the order of the bodies.")
 
     def replace(self, **changes: Any) -> Scene:
         """Return a copy with other parts."""

@@ -285,7 +285,7 @@ def check_pairs(scene: Scene) -> None:
         one, two = sorted((shapes[pair.first], shapes[pair.second]), key=lambda shape: shape.type != "plane")
         if (one.type, two.type) not in PLACES:
             one, two = two, one
-        reason = unknown_friction(scene, pair) if _places(one, two) else "their gap is not known"
+        reason = unknown_friction(scene, pair) if _places(one, two) else "their gap is not implemented"
         raise SceneError(
             f"Pair {pair.name!r} of a {one.type} and a {two.type} has no rows: {reason}. Valid are pairs of "
             f"{', '.join(map(' and '.join, PLACES))}, with friction that slides (dimension=3) or without (1)."
@@ -298,9 +298,11 @@ def unknown_friction(scene: Scene, pair: Pair) -> str:
         return ""
     if pair.dimension != 3:
         many = f"dimension={pair.dimension}, condim in a file"
-        return f"friction that spins or rolls is not done ({many}; 3, or without=rolling, keeps what slides)"
+        return (
+            f"torsional and rolling friction are not supported ({many}; 3, or without=rolling, keeps sliding friction)"
+        )
     if pair.friction[0] != pair.friction[1]:
-        return f"friction that differs by direction is not done ({pair.friction[0]} and {pair.friction[1]})"
+        return f"friction that differs by direction is not supported ({pair.friction[0]} and {pair.friction[1]})"
     if not scene.friction:
         return "its friction is left out where Scene.friction is False (a file's friction=0; friction=1 has it)"
     return ""

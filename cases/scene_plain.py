@@ -34,7 +34,7 @@ def scene_from(values: Any) -> Scene:
         parts = {name: tuple(map(kind, values.get(name, ()))) for name, kind in groups.items()}
         return Scene(gravity=values["gravity"], friction=bool(values.get("friction", False)), **parts)
     except (TypeError, KeyError, AttributeError) as error:
-        raise SceneError(f"This is no scene: {error}.") from None
+        raise SceneError(f"This is not a scene: {error}.") from None
 
 
 def _parts() -> dict[str, Any]:

@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from textwrap import wrap
 from xml.sax.saxutils import escape
 
 import matplotlib as mpl
@@ -65,8 +66,9 @@ def sh(*commands: str, codes: Sequence[int] = (0,)) -> str:
 
 
 def terminal(text: str, lines: int = 40) -> None:
-    """Write what was printed as a picture."""
-    rows = [row if len(row) <= COLUMNS else f"{row[:COLUMNS]}…" for row in text.rstrip().splitlines()][:lines]
+    """Write what was printed as a picture: long lines folded, and of many the first and the last."""
+    rows = [part for row in text.rstrip().splitlines() for part in wrap(row, COLUMNS, subsequent_indent="    ") or [""]]
+    rows = rows if len(rows) <= lines else [*rows[: lines - 2], "…", rows[-1]]
     wide, tall = 7.25 * max(map(len, rows)) + 24, 16 * len(rows) + 20
     told = "".join(
         f'<tspan x="12" y="{24 + 16 * i}"{" font-weight=" + chr(34) + "bold" + chr(34) if row.startswith("$") else ""}>'
@@ -98,8 +100,9 @@ def save(figure: plt.Figure, to: str | Path = "figure.svg") -> None:
     """Write a figure; the same file from the same numbers."""
     figure.savefig(to, metadata={"Date": None})
     plt.close(figure)
-    if Path(to).suffix == ".svg":  # hundredths of a point are enough, and nobody reads its text
-        text = re.sub(r"<!--.*?-->|(?<=\d\.\d\d)\d+|^ +", "", Path(to).read_text(encoding="utf-8"), flags=re.MULTILINE)
+    if Path(to).suffix == ".svg":  # hundredths of a point are enough in tags
+        short = r"<!--.*?-->|(?<=\d\.\d\d)\d+(?=[^<>]*>)|^ +"
+        text = re.sub(short, "", Path(to).read_text(encoding="utf-8"), flags=re.MULTILINE)
         Path(to).write_text(re.sub(r"\n+", "\n", text), encoding="utf-8")
 
 
@@ -207,11 +210,12 @@ def log_format() -> None:
 
 @drawn
 def cache() -> None:
-    """The first run of an installation, and the next one."""
+    """What the first run of an installation says while it compiles, and what is kept."""
     os.environ["CROSSBODY_CACHE"] = "cache"
-    run = "crossbody run bouncing_ball --variant listing -e reference:compiled --out ball -q"
     try:
-        terminal(sh(run, "crossbody cache", run))
+        command, said, *rest = sh("crossbody run bouncing_ball --variant listing -e reference:compiled").splitlines()
+        counted = [row for row in rest if "compiling the reference" in row]
+        terminal("\n".join([command, counted[0], "…", counted[-1], said, "…", sh("crossbody cache")]))
     finally:
         del os.environ["CROSSBODY_CACHE"]
 
@@ -409,9 +413,9 @@ def analyse() -> None:
     sh("crossbody analyse soft_contact --locus kstar=500..700 --out fingers -q")
     rows = pd.read_parquet("fingers/analysis-locus.parquet")
     figure, axes = plots(figsize=(8, 4))
-    for place, mine in rows.groupby("place", sort=False):
+    for mark, (place, mine) in zip("os+x", rows.groupby("place", sort=False), strict=False):
         near = mine[mine["real"].between(-12.0, 10.0)][::6]
-        axes[0, 0].plot(near["real"], near["imag"], ".", ms=4, label=str(place))
+        axes[0, 0].plot(near["real"], near["imag"], mark, ms=7, mfc="none", label=str(place))
     axes[0, 0].axvline(0.0, color="black", lw=0.8)
     axes[0, 0].set(xlabel="real part [1/s]", ylabel="imaginary part [rad/s]", xlim=(-12.0, 10.0))
     axes[0, 0].legend(frameon=False)

@@ -47,7 +47,8 @@ def load(name: str) -> Engine:
         known = name in REGISTRY.own()
         brings = f"crossbody[{name}]" if known else package
         raise EngineUnavailable(
-            f"Engine {name!r} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."
+            f"Engine {name!r} needs the package {package!r}, which is not installed; install it with: pip "
+            f"install {brings!r}"
         ) from None
     engine: Engine = module.ENGINE
     check_values(f"The engine file {module.__file__}", engine, _ATTRIBUTES, "ENGINE.")

@@ -16,7 +16,7 @@ from crossbody.engines.contract import Run
 from crossbody.engines.equations import module
 from crossbody.engines.linear import Chart, Spot, Tangent
 
-WIDER = "The engine's joints hold what rows of the case hold: its coordinates are fewer."
+WIDER = "Joints of the engine replace rows of the case, so it has fewer coordinates."
 
 
 def form_of(case: Case, powered: bool = True, steady: bool = False) -> Form | None:

@@ -22,7 +22,7 @@ _SIGNATURES = {
     "switch": _I(_V, _V, _B, _I),
 }  # fmt: skip
 
-ALL_AT_ONCE = "Which rows can be touched depends on where bodies are: no state has all of them on at once."
+ALL_AT_ONCE = "The rows that can be touched depend on the positions of bodies: no state has all of them active."
 
 
 class Gated:

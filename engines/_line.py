@@ -135,11 +135,11 @@ def _first(there: NDArray[np.bool_]) -> int:
 def why_no_line(case: Case) -> str | None:
     """Return why a case is not of bodies on one line, in words that go on from "It"; None if it is."""
     if (scene := case.scene) is None:
-        return f"has no scene as data, but the mechanism {case.mechanism!r}."
+        return f"has no scene, but the mechanism {case.mechanism!r}."
     if scene.actuators or scene.pushes or scene.pairs or any(loop.in_space for loop in scene.loops):
         return "has loops in space, actuators, pushes or pairs of shapes."
     if [joint.body for joint in scene.joints] != [body.name for body in scene.bodies]:
-        return "has bodies with no joint, or with several."
+        return "has bodies without a joint, or with several."
     bodies = zip(scene.bodies, scene.joints, strict=True)
     axes = [matrices(np.array(body.orientation)) @ joint.axis for body, joint in bodies]
     slides = all(joint.type == "slide" for joint in scene.joints) and not any(body.parent for body in scene.bodies)

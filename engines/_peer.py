@@ -24,7 +24,7 @@ Crossing = tuple[int, float, Floats, Floats, int]
 """Before which sample, when (s), q and v there, and the row whose gap is zero; -1 where a force turns."""
 OPEN = float(np.finfo(np.float64).tiny)
 """Gap of a row at the instant at which it comes free, m: no more than a sign."""
-_SCALAR = "Bodies on a line alone are compared: masses, gravity and constants say all."
+_SCALAR = "Only bodies on a line are compared, which masses, gravity and constants determine completely."
 LEAST_PUSH = 1e-9  # an impulse below this part of the momentum that a body has is none
 STEPS = Parameter(default=2_000_000, doc="bound on the number of steps", low=1, high=1e9)
 
@@ -60,7 +60,7 @@ def why_beside(engine: str, case: Case) -> str | None:
     """Return why an engine that builds a scene's own parts cannot run a case; None if it has but these."""
     more = {"forces": case.force, "rows and gates": case.gates, "a scene in other coordinates": case.form}
     found = [name for name, part in more.items() if part is not None]
-    return f"{engine} builds the parts of a scene alone, and {case.label} has {found[0]} beside." if found else None
+    return f"{engine} builds only the parts of a scene, but {case.label} also has {found[0]}." if found else None
 
 
 def why_not(engine: str, case: Case) -> str | None:
@@ -70,7 +70,7 @@ def why_not(engine: str, case: Case) -> str | None:
     if case.scene is not None and (found := frictional(case.scene)):
         return found
     reason = why_no_line(case)
-    return None if reason is None else f"{engine} is given bodies on one line alone, and {case.label} {reason}"
+    return None if reason is None else f"{engine} supports only bodies on one line, but {case.label} {reason}"
 
 
 def sampled(
@@ -208,9 +208,9 @@ class Steps:
         lam = self._multipliers(t, v)
         mode = np.where(lam > 0.0, CONTACT, FREE).astype(np.int8)
         gap, energy = scene.observe(q, v)
-        outcome, what = ended(scene, q[-1], v[-1]), "the state left what the scene can reach"
+        outcome, what = ended(scene, q[-1], v[-1]), "the state left the region that the scene can reach"
         if outcome.ok and self.t_end - t[-1] > 1e-9 * self.dt:
-            outcome, what = Outcome.STEP_LIMIT, f"{self.max_steps} steps of {self.dt:g} s were not enough"
+            outcome, what = Outcome.STEP_LIMIT, f"{self.max_steps} steps of {self.dt:g} s did not reach the horizon"
         place = f"t = {t[-1]:g} s, q = {q[-1].tolist()}, v = {v[-1].tolist()}"
         return Trajectory(
             t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=events(t, mode),
@@ -231,7 +231,7 @@ def no_rigid_contact(case: Case) -> str | None:
     """The sentence for rows that cannot open, where contacts are rigid."""
     if case.law.unilateral.all():
         return None
-    return "A rigid contact pushes only: a row that is always on, with a law of its own, is none."
+    return "A rigid contact only pushes, so a row that is always active cannot be one."
 
 
 def restitution(scene: Line) -> float:

@@ -115,12 +115,12 @@ class Stepper(Protocol):
 def why_no_steps(engine: str, scene: Scene, bounds: bool = False) -> str | None:
     """Return why an engine that steps contacts, perhaps bounds, runs no scene with friction; or None."""
     if dry := next((part for part, _ in scene.dry), None):
-        return f"{engine} steps contacts alone, and {dry.name!r} has dry friction (friction_loss, without=friction)."
+        return f"{engine} supports contacts only, but {dry.name!r} has dry friction (friction_loss, without=friction)."
     if scene.loops:
-        return f"{engine} steps contacts alone, and the loop {scene.loops[0].name!r} is always on."
+        return f"{engine} supports contacts only, but the loop {scene.loops[0].name!r} is always on."
     bounded = next((part for part in scene.bounded if np.isfinite(part.range).any()), None)
     if bounded is not None and not bounds:
-        return f"{engine} steps contacts alone, and {bounded.name!r} has bounds (without=limits leaves a file's out)."
+        return f"{engine} supports contacts only, but {bounded.name!r} has bounds (without=limits leaves a file's out)."
     return None
 
 
@@ -174,7 +174,7 @@ class RubbingRun(Run):
             t = k * dt
             place = f"t = {t:g} s"
             if k >= int(self.settings["max_steps"]):
-                return Outcome.STEP_LIMIT, f"{place}: {k} steps of {dt:g} s were not enough."
+                return Outcome.STEP_LIMIT, f"{place}: {k} steps of {dt:g} s did not reach the horizon."
             while instants and instants[0] <= t + AT_GRID * dt:
                 self.stepper.change(self.acting.at(instants.pop(0), q, v), t)
             try:

@@ -363,7 +363,7 @@ class Rows:
     def __init__(self, scene: Scene, forces: Forces) -> None:
         for loop in scene.loops:
             if loop.in_space:
-                raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not built here.")
+                raise CaseUnsupported(f"Loop {loop.name!r} of type {loop.type} is not supported here.")
         self.scene, self.forces = scene, forces
         self.ends = [(self._end(loop.type, loop.first), self._end(loop.type, loop.second)) for loop in scene.loops]
         self.curves = [derivatives(loop.polynomial) for loop in scene.loops]

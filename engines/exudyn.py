@@ -1,4 +1,4 @@
-"""Exudyn: connectors with the case's law as symbolic functions, or springs and dampers as they come."""
+"""Exudyn: connectors with the case's law as symbolic functions, or plain springs and dampers."""
 
 from __future__ import annotations
 
@@ -166,13 +166,13 @@ def _trajectory(
     columns = [np.column_stack([model.mbs.GetSensorStoredData(s)[:, 1] for s in group]) for group in model.sensors]
     t: Floats = model.mbs.GetSensorStoredData(model.sensors[0][0])[:, 0]
     q, v, lam = columns[0], columns[1], -columns[2]
-    outcome, what = ended(scene, q[-1], v[-1]), "the state left what the scene can reach"
+    outcome, what = ended(scene, q[-1], v[-1]), "the state left the region that the scene can reach"
     if outcome.ok and abs(t[-1] - case.t_end) > 1e-9 * case.t_end:
         short = begun < limit
         outcome = Outcome.STEP_TOO_SMALL if short else Outcome.STEP_LIMIT
-        what = "Exudyn gave up" if short else f"{limit} steps were not enough"
+        what = "Exudyn gave up" if short else f"{limit} steps did not reach the horizon"
     elif outcome.ok and not done:
-        outcome, what = Outcome.STEP_TOO_SMALL, "Exudyn says that it failed"
+        outcome, what = Outcome.STEP_TOO_SMALL, "Exudyn reported a failure"
     message = "" if outcome.ok else f"t = {t[-1]:g} s, q = {q[-1].tolist()}, v = {v[-1].tolist()}: {what}."
     t = np.where(t > case.t_end, case.t_end, t)
     return sampled(
@@ -204,7 +204,7 @@ class Exudyn(Engine):
     name = "exudyn"
     profiles: Mapping[str, str] = {
         "matched": "the case's law as a symbolic function of each connector, error-controlled Runge-Kutta (DOPRI5) "
-        "at a tight tolerance; memoryless, every row as if it were alone",
+        "at a tight tolerance; memoryless, each row independent of the others",
         "default": "the obvious model: springs and dampers that act below the surface, generalised-alpha, fixed steps",
     }
     hidden = HIDDEN

@@ -1,4 +1,4 @@
-"""pymunk (Chipmunk 2-D): sequential impulses with a restitution in every time step, made for games."""
+"""pymunk (Chipmunk 2-D): sequential impulses with a restitution in every time step, designed for games."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Pymunk(Engine):
     name = "pymunk"
     profiles: Mapping[str, str] = {
         "matched": "the restitution of the law's linear part, no allowed overlap, 200 iterations, steps of 1 ms",
-        "default": "as it comes: overlap of 0.1 allowed, 10 iterations, steps of 1/60 s",
+        "default": "default: overlap of 0.1 allowed, 10 iterations, steps of 1/60 s",
     }
     hidden = HIDDEN
     versions: Mapping[str, str] = {"pymunk": pymunk.version, "Chipmunk": pymunk.chipmunk_version}
@@ -84,7 +84,7 @@ class Pymunk(Engine):
         _settings.profile_of(self.name, self.profiles, profile)
         if why := why_not("pymunk", case) or no_rigid_contact(case):
             return why
-        return "pymunk's plane is x, z, and the bodies slide along y too." if line(case).axis[1] else None
+        return "pymunk's plane is x, z, but bodies also slide along y." if line(case).axis[1] else None
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **given: Any) -> PeerRun:
         """Build the space; see `Engine.prepare`. Settings: dt, s; restitution; max_steps."""

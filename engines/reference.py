@@ -26,7 +26,7 @@ DEPENDENT = 1e6
 """Condition of H M^-1 H^T beyond which rounding parts two engines' multipliers by over 1e-9."""
 OF_THE_CASE = "case"
 _ROBOT = (
-    "IDA goes through, but factorises 24 unknowns for every step and begins anew at every tick of a "
+    "IDA works, but factorises 24 unknowns in every step and restarts at every tick of a "
     "controller; CVODE is the independent check on the robot, and simulate(..., solver='ida') runs it."
 )
 UNSUITED = {("delta", "ida"): _ROBOT, ("soft_delta", "ida"): _ROBOT}
@@ -237,10 +237,10 @@ def _known(case: Case, solver: str) -> dict[str, Parameter]:
         "time_limit": Parameter(default=3600.0, unit="s", doc="bound on processor time", low=0.0, open_low=True),
     }
     if solver == "compiled":
-        known["shortcuts"] = Parameter(default=True, doc="closed-form arcs where the scene is affine", low=0, high=1)
-        known["implicit"] = Parameter(default=True, doc="the implicit method where the law is stiff", low=0, high=1)
+        known["shortcuts"] = Parameter(default=True, doc="closed-form arcs if the scene is affine", low=0, high=1)
+        known["implicit"] = Parameter(default=True, doc="the implicit method if the law is stiff", low=0, high=1)
     if solver == "compiled" and case.general:
-        known["traced"] = Parameter(default=KEPT, doc="code compiled for this model alone", choices=tuple(TRACED))
+        known["traced"] = Parameter(default=KEPT, doc="code compiled only for this model", choices=tuple(TRACED))
     if solver == "ida":
         known["index"] = Parameter(default=1, doc="1, or 3 for bilateral rows", low=1, high=3)
     return known

@@ -65,7 +65,7 @@ class Budget:
         """Count what was decoded, and look at the clock of this thread."""
         taken = self.taken + (0.0 if math.isnan(self._entered) else time.thread_time() - self._entered)
         if taken > self.seconds:
-            text = f"takes more than {self.seconds:.3g} s to unfold, as no log of {_shown(self.size)} does"
+            text = f"takes more than {self.seconds:.3g} s to decompress, which no valid log of {_shown(self.size)} does"
             text += " (`memory` raises the limit)."
             raise LogFormatError(self._path, text)
         self._spent += decoded

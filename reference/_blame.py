@@ -129,7 +129,7 @@ def dependence(system: System, active: Index, q: Floats, v: Floats) -> str:
         return ""
     A = np.linalg.solve(np.linalg.cholesky(M), H.T)
     if len(active) == 1:
-        return f"Row [{active[0]}] has H M^-1 H^T = {np.sum(A * A):.3g}: hardly anything moves it near "
+        return f"Row [{active[0]}] has H M^-1 H^T = {np.sum(A * A):.3g}: almost nothing can move it near "
     rank = int(np.linalg.matrix_rank(A))
     if rank < len(active):
         return f"Rows {active.tolist()} have a singular H M^-1 H^T, of rank {rank}, near "

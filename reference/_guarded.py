@@ -73,7 +73,7 @@ class GuardedCall:
             if line.tobytes() != expected.tobytes():
                 raise SceneError(f"Kernel {self.name} writes beyond {name}, whose shape is {array.shape}. {DEBUG}")
             if name in self.inputs and array.tobytes() != self.inputs[name].tobytes():
-                raise SceneError(f"Kernel {self.name} writes {name}, which it may only read.")
+                raise SceneError(f"Kernel {self.name} writes {name}, which is read-only.")
         return {name: lines[name][1] for name in self.outputs}
 
     def _origin(self, name: str, where: str) -> str:
@@ -85,7 +85,7 @@ class GuardedCall:
                     array = self.inputs.get(argument, self.outputs.get(argument))
                     hint = self.hints.get(argument, "")
                     return f"Kernel {self.name} reads beyond {argument}, whose shape is {array.shape}. {hint}{DEBUG}"
-        return f"Kernel {self.name} makes {where} from what stood in its arrays before; they hold no zeros."
+        return f"Kernel {self.name} makes {where} from the previous content of its arrays, which are not zeroed."
 
 
 def _line(value: Any, around: float) -> tuple[Any, Any]:

@@ -48,14 +48,16 @@ OUTCOMES = {
 _ACTIVE = (layout.CONTACT, layout.COLLISION, layout.BILATERAL, layout.STICK, layout.SLIP)
 _COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions", "guards")
 _NOTES = {
-    "indeterminate": "indeterminate: how contacts that slid shared their load, which no law says, moved the bodies; it "
-    "was taken of least norm.",
+    "indeterminate": (
+        "indeterminate: how contacts that slid shared their load, which the law does not "
+        "determine, moved the bodies; the least norm was used."
+    ),
     "not_unique": "modes_not_unique: more than one set of sticking and sliding contacts was consistent at an instant; "
-    "the one that was reached first was taken.",
+    "the one that was reached first was used.",
 }
 _LOOPS_PRESS = (
-    "indeterminate: loops hold a contact that may slide, so that no law says how hard it "
-    "presses, nor its friction; it was taken without any."
+    "indeterminate: loops hold a contact that may slide, so that its normal force and friction are "
+    "undetermined; it was computed without friction."
 )
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
@@ -335,7 +337,7 @@ class CompiledRun:
             why = (
                 "energy, power and dynamics contradict each other"
                 if abs(state["energy_open"]) > state["energy_added"]
-                else "there was far more energy before, and what is left is not known"
+                else "there was far more energy before, so the remaining energy is not known accurately"
             )
             return (
                 f"The energy account is open by {state['energy_open']:.3g} J, where {state['energy_allowed']:.3g} J "

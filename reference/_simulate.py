@@ -43,7 +43,7 @@ def simulate(system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, **optio
 def prepare(system: System, q0: ArrayLike, v0: ArrayLike, options: Options) -> Any:
     """A run that can be repeated: everything that does not depend on time is decided here."""
     if numba_config.DISABLE_JIT:
-        raise InvalidValue("A run needs compiled kernels; NUMBA_DISABLE_JIT in the environment leaves them Python.")
+        raise InvalidValue("A run needs compiled kernels; NUMBA_DISABLE_JIT in the environment prevents compilation.")
     start = system.checked_state("q0", q0), system.checked_state("v0", v0)
     options.check_friction(system)
     check_once(system, *start, options.t_end)

@@ -104,5 +104,5 @@ def started(system: System, q: Floats, v: Floats, given: Floats | None = None) -
         system.switch(0.0, q, v, p, mode, int(kernel_types.START))
         changed = p[:constants] != np.asarray(system.p if given is None else given)[:constants]
         if np.any(changed):
-            raise SceneError(f"Kernel switch writes {entry('p', changed)}, which is no discrete variable.")
+            raise SceneError(f"Kernel switch writes {entry('p', changed)}, which is not a discrete variable.")
     return p, mode

@@ -162,7 +162,9 @@ class System:
         self._put_friction(nc)
         self._check_told()
         if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
-            raise SceneError(f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open is none.")
+            raise SceneError(
+                f"System.redundant is {np.asarray(self.redundant).tolist()}; a row that may open cannot be redundant."
+            )
         values = list(self.parameters.values()) if isinstance(self.parameters, Mapping) else self.parameters
         put(self, "discrete", frozen("System", "discrete", self.discrete, (None,)))
         self._check_kinks()
@@ -250,12 +252,14 @@ class System:
         if np.any(wrong):
             row = int(np.flatnonzero(wrong)[0])
             raise SceneError(
-                f"Row {row} has dry friction of its own (System.friction_loss): it must be no "
-                "row that is always on, follow no other, and none may follow it."
+                f"Row {row} has dry friction of its own (System.friction_loss): it must not be always active, "
+                "must not follow another row, and no row may follow it."
             )
         put(self, "follows", np.where(dry, own, follows))  # it is its own tangential row
         if not np.all(np.isfinite(drift)) or np.any(drift[~(slides | dry)] != 0.0):
-            raise SceneError(f"System.drift is {drift.tolist()}; it must be finite, and 0 but of rows with friction.")
+            raise SceneError(
+                f"System.drift is {drift.tolist()}; it must be finite, and 0 except for rows with friction."
+            )
         put(self, "mu", frozen("System", "mu", given, (nc,)))
         put(self, "friction", frozen("System", "friction", mu, (nc,)))
         put(self, "drift", frozen("System", "drift", drift, (nc,)))

@@ -58,7 +58,7 @@ def base() -> Path | None:
         return root.expanduser() / "compiled"
     except RuntimeError:  # a user without a name has no home
         why = f"in {given} (there is no such home folder)" if given else "(there is no home folder)"
-        tell(f"compiled code cannot be kept {why}; every process compiles anew. " + ADVICE)
+        tell(f"compiled code cannot be kept {why}; every process compiles again. " + ADVICE)
         return None
 
 
@@ -80,7 +80,7 @@ def _opened(where: Path) -> Store | None:
         problem = _problem(where)
     except OSError as error:
         why = f"{error.filename} is a file" if isinstance(error, FileExistsError) else error.strerror
-        tell(f"compiled code cannot be kept in {where} ({why}); every process compiles anew. " + ADVICE)
+        tell(f"compiled code cannot be kept in {where} ({why}); every process compiles again. " + ADVICE)
         return None
     if problem:
         tell(f"the cache folder {where} {problem}; compiled code is neither read from it nor kept. " + ADVICE)
@@ -174,7 +174,7 @@ class Store:
                 file.write(MAGIC + _seal(name, data) + data)
             os.replace(part, self.folder / (name + CODE))
         except OSError as error:
-            tell(f"compiled code cannot be kept in {self.folder} ({error.strerror}); it serves this process alone.")
+            tell(f"compiled code cannot be kept in {self.folder} ({error.strerror}); it is used only by this process.")
             with suppress(OSError):
                 os.unlink(part)
             return

@@ -73,7 +73,7 @@ class Options:
         ledger: keep the energy account.
         events: keep every event; without them (and with `samples`) memory does not grow with the
             number of bounces.
-        shortcuts: closed-form arcs where the scene is affine.
+        shortcuts: closed-form arcs if the scene is affine.
         implicit: the implicit method where the explicit one is bound by stability.
         index: 1, or 3 for bilateral rows under "ida".
         max_step: longest step, s.
@@ -168,7 +168,7 @@ class Options:
             return False
         asked = f"collisions={self.collisions!r}"
         if self.fsm != "level":
-            raise InvalidValue(f"{asked} needs fsm='level', not {self.fsm!r}, which knows real time; use 'resolved'.")
+            raise InvalidValue(f"{asked} needs fsm='level', not {self.fsm!r}, which uses real time; use 'resolved'.")
         cubic = np.flatnonzero(fast & (np.asarray(system.b2) > 0.0))
         if len(cubic):
             raise InvalidValue(
@@ -191,9 +191,9 @@ class Options:
         if self.solver == "ida":
             raise InvalidValue(f"solver is {self.solver!r}, and {why}; valid: 'compiled', 'cvode'.")
         if np.any(np.asarray(system.b0) > 0.0) or np.any(np.asarray(system.b1) > 0.0):
-            raise SceneError(f"System.b0, b1 are given, and {why}: collisions with friction are not done.")
+            raise SceneError(f"System.b0, b1 are given, and {why}: collisions with friction are not supported.")
         if system.solve is not None:
-            raise SceneError(f"System.solve is given, and {why}: they are solved for by the general algebra.")
+            raise SceneError(f"System.solve is given, and {why}: they are solved by the general algebra.")
 
     def schedule(self, system: System, *, played: bool = False) -> tuple[Floats, Floats]:
         """Times (m,) and values (m, nu) of the inputs, checked, with those that stand for activations.

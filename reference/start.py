@@ -44,7 +44,7 @@ class OffRowsError(SceneError):
             offered = f"The nearest on all such rows is q0 = {q0}, v0 = {v0} (System.project)."
         super().__init__(
             f"The start{run} is off row {row}, which is always on: {off}. {offered} "
-            "consistent=False admits a start that is off its rows on purpose."
+            "consistent=False allows a start that violates its rows on purpose."
         )
 
 

@@ -94,7 +94,8 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 )  # fmt: skip
 @click.option(
     "--budget", type=options.ABOVE_0, default=5.0, show_default=True, metavar="S",
-    help="Processor time of a tight run of a scene: motions are compared as far as it gets. Engines have 12 times it.",
+    help=("Processor time of the tightest run of a scene: motions are compared as far as it gets. Engines may "
+        "take 12 times as long."),
 )  # fmt: skip
 @options.engine_limit
 @options.against
@@ -429,7 +430,7 @@ def _obey(arguments: list[str] | None) -> int:
         if told := installed.sentence(error):
             return _say(told)
         if isinstance(error, FileNotFoundError) and _nowhere():
-            return _say("The folder that the command was given in has been removed; change to another one.")
+            return _say("The working folder has been removed; change to another one.")
         if isinstance(error, OSError) and error.errno in REFUSED:
             _drop_what_cannot_be_printed()
             return _say(f"The system refuses: {error.strerror}{f' ({error.filename})' if error.filename else ''}.")

@@ -28,17 +28,26 @@ PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
     "without": Parameter(
-        default="", doc="left out of every engine: friction, contacts, medium, loop:NAME, ..., a comma between them"
+        default="", doc="left out of every engine: friction, contacts, medium, loop:NAME, ..., separated by commas"
     ),
     "ctrl": Parameter(default="", doc="table of controls: t and a column for every actuator (CSV, Parquet, NPZ)"),
     "control": Parameter(default="", doc="controller: FILE.py:NAME of a callable (t, q, v) -> u, or of a class"),
     "tick": Parameter(default=1e-3, unit="s", doc="between two calls of the controller", low=0.0, open_low=True),
     "friction": Parameter(
-        default=WHERE_MET, doc="contacts that slide have rows: 1, 0; -1: if the motion comes to one", low=-1, high=1
+        default=WHERE_MET, doc="contacts with friction have rows: 1, 0; -1: if the motion reaches one", low=-1, high=1
     ),
-    "push": Parameter(default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; more behind a ;"),
-    "rank": Parameter(default=-1, doc="rows of the loops that hold; -1: those that surely do", low=-1, high=1e6),
-    "assemble": Parameter(default=False, doc="start on the loops, nearest to the keyframe", low=0, high=1),
+    "push": Parameter(
+        default="", doc=("forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; several separated by ;")
+    ),
+    "rank": Parameter(
+        default=-1,
+        doc=("number of independent rows of the loops; -1: those that are clearly independent"),
+        low=-1,
+        high=1e6,
+    ),
+    "assemble": Parameter(
+        default=False, doc=("start at the nearest state to the keyframe that closes the loops"), low=0, high=1
+    ),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
 ENTRIES = {
@@ -195,12 +204,12 @@ def case_of(
     if not file:  # of a file's the run tells whether they meet
         check_pairs(scene)
     if rank >= 0 and not scene.loops:
-        raise SceneError(f"rank is {rank}, and the scene has no loops whose rows it could count.")
+        raise SceneError(f"rank is {rank}, but the scene has no loops.")
     start = normalised(reference_pose(scene) if q0 is None else np.asarray(q0), quaternions(scene))
     names, laws, _ = rows_of(scene)
     if fast := [name for name, one in zip(names, laws, strict=True) if one.b0 or one.b1]:
         raise SceneError(
-            f"Row {fast[0]!r} has constants of COLLISION, which no row of a scene follows: b0, b1 must be 0."
+            f"Row {fast[0]!r} has constants of COLLISION, which the rows of a scene do not have: b0, b1 must be 0."
         )
     return Case(
         name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
@@ -264,24 +273,24 @@ def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
 AS_IT_STANDS = (
     Limit(
         metric="*", engine="mujoco", profile="as_is", covers_none=True,
-        known="the file's own step, integrator and soft rows: parts of its error say how far each of them goes",
+        known="the file's own step, integrator and soft rows: the parts of its error show the effect of each",
     ),
     Limit(
         metric="event_gap", value=1.0, engine="mujoco", profile="as_is", covers_none=True,
-        known="its rows are in contact where they push, which may begin and end below their surface",
+        known="its rows are in contact while they push, which may begin and end below their surface",
     ),
     *(
         Limit(
             metric=f"largest {metric} (importer)", value=1e-9, engine="mujoco", profile="as_is",
-            why="the same engine and steps on the model that is built from the scene: rounding, and what grows from it",
+            why="the same engine and steps on the model that is built from the scene: rounding, and its growth",
         )
         for metric in ("position", "event_times")
     ),
     *(
         Limit(metric="*", engine="drake", profile=profile, covers_none=True, known=known)
         for profile, known in (
-            ("continuous", "Runge-Kutta 3 and an accuracy of 1e-4, what a Simulator starts with, and no rows"),
-            ("default", "steps of 1 ms, and bounds that are springs: parts of its error say how far it goes"),
+            ("continuous", "Runge-Kutta 3 and an accuracy of 1e-4, the defaults of a Simulator, and no rows"),
+            ("default", "steps of 1 ms, and bounds that are springs: the parts of its error show their effect"),
         )
     ),
 )  # fmt: skip
@@ -311,4 +320,6 @@ def assembled(model: Any, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         if np.abs(h).max(initial=0.0) <= CLOSED:
             return found, v - np.linalg.solve(root.T, off_v)
         mujoco.mj_integratePos(model, found, -np.linalg.solve(root.T, off_h), 1.0)
-    raise SceneError(f"The start does not assemble: no positions that close the loops are found from q = {q.tolist()}.")
+    raise SceneError(
+        f"The start cannot be assembled: no positions that close the loops were found from q = {q.tolist()}."
+    )

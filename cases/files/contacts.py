@@ -88,11 +88,11 @@ def _why(model: Any, pair: tuple[int, ...], rubs: Mapping[frozenset[str], str]) 
     types = (mujoco.mjtGeom(int(model.geom_type[geom])).name.removeprefix("mjGEOM_").lower() for geom in pair)
     one, two = ("hull" if kind == "mesh" else kind for kind in types)
     if not {(one, two), (two, one)} & PLACES.keys():
-        return f"no gap of a {one} and a {two} is known"
+        return f"the gap between a {one} and a {two} is not implemented"
     if "hull" in (one, two):
         most = PLACES["plane", "hull"]
         return f"the hull has more than {most} corners (a mesh of a file has at most its maxhullvert)"
-    return "no joint moves one against the other"
+    return "no joint moves one relative to the other"
 
 
 def _named(model: Any, geom: int) -> str:

@@ -83,7 +83,7 @@ def _check_columns(columns: list[str], names: list[str]) -> None:
             raise ValueError(f"there is no column {name!r}; it has: {', '.join(columns)}.")
     for name in columns:
         if name not in ("t", *names):
-            raise ValueError(f"the column {name!r} is no actuator's.")
+            raise ValueError(f"the column {name!r} does not belong to an actuator.")
 
 
 def _check_size(size: int) -> None:
@@ -144,7 +144,7 @@ def _push(text: str, scene: Scene) -> tuple[str, Floats, tuple[float, float]]:
         force, start, end = [], 0.0, 0.0
     if len(force) != 3 or not (np.isfinite(force).all() and 0.0 <= start < end):
         valid = "BODY FX FY FZ T0 T1 with finite forces and 0 <= T0 < T1"
-        raise InvalidValue(f"push: {shown(text.strip())} is no push; valid: {valid}.")
+        raise InvalidValue(f"push: {shown(text.strip())} is not a push; valid: {valid}.")
     names = [one.name for one in scene.bodies]
     if body.strip() not in names:
         raise InvalidValue(f"push: there is no body {shown(body.strip())}; valid: {', '.join(names)}.")

@@ -59,7 +59,7 @@ def leave_out_missing(spec: Any, path: Path) -> list[str]:
     """
     gone = {_name(mesh): file for mesh, file in _files(spec, path) if not file.exists()}
     taken = _leave_out(spec, set(gone))
-    return [f"Mesh {name!r} is only drawn, and left out: there is no file {gone[name]}." for name in taken]
+    return [f"Mesh {name!r} is purely visual, and left out: there is no file {gone[name]}." for name in taken]
 
 
 def _leave_out(spec: Any, names: set[str]) -> list[str]:

@@ -261,7 +261,9 @@ def _tendon(model: Any, i: int) -> Tendon:
         joined["joints"] = tuple(_name(model, "jnt", j) for j in parts)
         joined["coefficients"] = _floats(model.wrap_prm[where])
     else:
-        raise SceneError(f"Tendon {name!r} runs over shapes or more than two sites; a scene has two points, or joints.")
+        raise SceneError(
+            f"Tendon {name!r} runs over shapes or more than two sites; in a scene it connects two points, or joints."
+        )
     if model.tendon_armature[i] != 0.0:
         raise SceneError(
             f"Tendon {name!r} has armature, which a scene does not have; valid: 0, or "

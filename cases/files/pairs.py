@@ -39,7 +39,7 @@ def _check_fields(model: Any, name: Callable[[int], str]) -> None:
         for one, other in (pair, pair[::-1]):
             if (word := unknown.get(int(model.geom_type[one]))) is not None:
                 raise SceneError(
-                    f"Shape {name(one)!r} is a {word}, whose contacts are not done, and "
+                    f"Shape {name(one)!r} is a {word}, whose contacts are not supported, and "
                     f"{name(other)!r} may touch it; valid: contype and conaffinity 0 for one of "
                     "them, or without=contacts, which leaves all contacts out of every engine."
                 )

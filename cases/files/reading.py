@@ -90,7 +90,7 @@ def _count(path: Path, folder: Path, seen: set[Path]) -> int:
                 elif event == "start" and part.tag == "include":
                     total += copies[-1] * _included(part.get("file", ""), path, folder, seen)
                 if total > LARGEST:
-                    raise SceneError(f"{path} has more than {LARGEST} bodies, the most that a scene may have.")
+                    raise SceneError(f"{path} has more than {LARGEST} bodies, the maximum of a scene.")
                 part.clear() if event == "end" else None
         except ElementTree.ParseError:
             return total

@@ -84,7 +84,7 @@ def check_understood(model: Any) -> None:
         if array.size and np.any(array != default):
             where = int(np.flatnonzero(np.any(np.reshape(array != default, (len(array), -1)), axis=1))[0])
             raise SceneError(
-                f"The model's {name}[{where}] is {array[where]}, which is not understood; it must be {default}."
+                f"The model's {name}[{where}] is {array[where]}, which is not supported; it must be {default}."
             )
     _check_options(model.opt)
 
@@ -119,6 +119,6 @@ def _check_options(option: Any) -> None:
             )
     if np.any(option.wind):
         raise SceneError(
-            "The model has wind, whose forces are not done; valid: no wind, or "
+            "The model has wind, whose forces are not supported; valid: no wind, or "
             "without=medium, which leaves it out of every engine."
         )

@@ -32,9 +32,9 @@ def parsed(path: Path) -> ElementTree.Element:
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
-        raise SceneError(f"{path} is no XML: {error}.") from None
+        raise SceneError(f"{path} is not XML: {error}.") from None
     if root.tag != "robot":
-        raise SceneError(f"{path} has the root <{root.tag}>; that of a URDF is <robot>.")
+        raise SceneError(f"{path} has the root <{root.tag}>; a URDF has <robot>.")
     return root
 
 
@@ -162,7 +162,7 @@ def findings(path: Path) -> list[str]:
         least, middle, most = np.linalg.eigvalsh(J)
         if mass < 0.0 or least < 0.0 or least + middle < most * (1.0 - 1e-9):
             told.append(f"Link {link.get('name')!r}: mass {mass:g} and moments {least:g}, {middle:g}, {most:g} are "
-                        "those of no rigid body; taken as they stand.")  # fmt: skip
+                        "impossible for a rigid body; used unchanged.")  # fmt: skip
     return told
 
 

@@ -40,7 +40,7 @@ def compiled(path: Path, compiler: Callable[[], Any]) -> tuple[Any, list[str]]:
         except ValueError as error:
             raise SceneError(f"{path}: MuJoCo's compiler refuses it: {error}") from None
     if any(NOT_A_NUMBER in text for text in warned):
-        raise SceneError(f"{path}: an entry is NaN; valid: numbers. MuJoCo would take it as not given.")
+        raise SceneError(f"{path}: an entry is NaN; valid: numbers. MuJoCo would treat it as not given.")
     return found, warned
 
 

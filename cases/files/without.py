@@ -75,7 +75,7 @@ def strip(model: Any, without: str) -> None:
         elif kind != "pair":
             named = ", ".join(f"{one}:NAME" for one in _ONE)
             raise InvalidValue(
-                f"without: {word!r} is nothing that can be left out; valid: {', '.join(ALL)}, {named}, pair:BODY:BODY."
+                f"without: {word!r} cannot be left out; valid: {', '.join(ALL)}, {named}, pair:BODY:BODY."
             )
 
 

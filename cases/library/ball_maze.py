@@ -31,7 +31,7 @@ def _positive(default: float, unit: str, doc: str) -> Parameter:
 
 
 PARAMETERS = {
-    "tip": Parameter(default=5.0, unit="deg", doc="how far the maze is tilted", low=0.0, high=90.0, open_low=True),
+    "tip": Parameter(default=5.0, unit="deg", doc="tilt of the maze", low=0.0, high=90.0, open_low=True),
     "gravity": _positive(9.81, "m/s^2", "gravity before the tilt"),
     "ball_radius": _positive(6.35e-3, "m", "radius of the ball"),
     "ball_mass": _positive(8.4e-3, "kg", "mass of the ball, solid"),
@@ -41,13 +41,14 @@ PARAMETERS = {
     "a1": Parameter(default=2000.0, unit="1/s", doc="damping of faces and tips over the mass", low=0.0),
     "a1_slip": Parameter(default=1000.0, unit="1/s", doc="rate at which slip on a face decays", low=0.0),
     "rolling": Parameter(default=True, doc="whether the ball rolls on faces; 0 for frictionless", low=0, high=1),
-    "rolling_damping": Parameter(default=0.0, unit="N m s", doc="torque on a touching ball over its spin", low=0.0),
+    "rolling_damping": Parameter(default=0.0, unit="N m s", doc=("torque on a touching ball divided by "
+        "its spin"), low=0.0),
     "controller": Parameter(default="off", doc="torque on the maze", choices=("off", "continuous", "sampled")),
     "pole": _positive(5.0, "1/s", "triple pole of the balance"),
     "omega": Parameter(default=0.06, unit="rad/s", doc="rate of the maze while it balances"),
     "wn": _positive(40.0, "rad/s", "natural frequency of the snatch"),
     "centre_pole": _positive(4.0, "1/s", "third pole in the centre"),
-    "a_max": Parameter(default=100.0, unit="rad/s^2", doc="bound on the maze's acceleration; 0 for none", low=0.0),
+    "a_max": Parameter(default=100.0, unit="rad/s^2", doc="bound on the acceleration of the maze; 0 for none", low=0.0),
     "u_max": Parameter(default=0.1, unit="N m", doc="bound on the torque; 0 for none", low=0.0),
     "model_gravity": _positive(1.0, "", "gravity in the controller's model over the true one"),
     "model_mass": _positive(1.0, "", "ball mass in the controller's model over the true one"),
@@ -60,7 +61,7 @@ PARAMETERS = {
     "ring": Parameter(default=3, doc="ring on whose face the ball starts", low=0, high=1e4),
     "side": Parameter(default="outer", doc="on top of the ring, or inside at the bottom", choices=("outer", "inner")),
     "angle": Parameter(default=0.0, unit="rad", doc="start from there towards +x"),
-    "theta": Parameter(default=0.0, unit="rad", doc="angle of the maze at the start"),
+    "theta": Parameter(default=0.0, unit="rad", doc="initial angle of the maze"),
     "t_end": _positive(75.0, "s", "horizon"),
 }  # fmt: skip
 
@@ -77,7 +78,7 @@ VARIANTS: dict[str, dict[str, Value]] = {
 }
 
 _TITLES = {
-    "inside": "a ball rolls to and fro inside a locked ring",
+    "inside": "a ball rolls back and forth inside a locked ring",
     "outside": "a ball rolls off the top of a locked ring",
     "free": "a ball swings inside a ring and turns the maze",
     "balanced": "feedback balances the ball on top of a ring",

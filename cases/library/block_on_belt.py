@@ -1,4 +1,4 @@
-"""A block on a spring is dragged along by a belt: it sticks once, then slides on a sine that grazes the belt's speed.
+"""A block on a spring is dragged along by a belt: it sticks once, then slides in a sine that grazes the belt's speed.
 
 With one coefficient for sticking and sliding there is no cycle of stick and slip, and at the
 instants at which the block is as fast as the belt it must not stick (docs/explanation/contacts.md).

@@ -1,4 +1,4 @@
-"""A ball dropped on a floor that pushes back as a spring and damper, with a ballistic state.
+"""A ball dropped on a floor that pushes back like a spring and damper, with a ballistic state.
 
 q = height of the lowest point, h = q (Bortoff, American Modelica Conference 2020).
 """
@@ -36,8 +36,8 @@ CLAIMS = {
     "contacts": (0.0, "a count"),
     "bounces": (0.0, "a count"),
     "transitions": (0.0, "a count"),
-    "final_gap": (1e-9, "the rest of the decay exp(-10 t), and the tolerance"),
-    "final_lam": (1e-6, "the rest of the decay exp(-10 t), and the tolerance"),
+    "final_gap": (1e-9, "the remainder of the decay exp(-10 t), and the tolerance"),
+    "final_lam": (1e-6, "the remainder of the decay exp(-10 t), and the tolerance"),
     "fifth_exit": (1e-2, "width of the zoomed figure"),
     "energy_per_bounce": (1e-6, _TOLERANCE),
     "separation_gap": (1e-7, _TOLERANCE),
@@ -48,8 +48,8 @@ CLAIMS = {
 
 OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and a step of 2 ms, not the case's law."
 IMPACT = (
-    "An impact in no time has no contact phase: a restitution replaces the law, so the ball "
-    "neither sinks in nor stays for the contact time, and weight does not act during it."
+    "An instantaneous impact has no contact phase: a restitution replaces the law, so the ball "
+    "neither sinks in nor stays in contact for a time in which its weight acts."
 )
 STEPPING = (
     "Time stepping on a rigid contact: first order, with impacts on the grid and a restitution instead of the law."
@@ -63,13 +63,13 @@ _STEP = (
     ("pinocchio", "admm", 2e-2, 3e-2, "first order, impacts on the grid"),
 )
 
-_OFF = "it starts off the floor, and what is left of that decays as the law prescribes"
+_OFF = "it starts off the floor, and the remaining distance decays as the law prescribes"
 _OTHER_LAW = (("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT), ("pinocchio", "admm", STEPPING))
-_SMALL = "the kinetic energy it is measured by is a thousandth of the energy that is stored"
-_FIXED = "Runge-Kutta 4 at fixed steps of 1 ms, with no event to locate"
+_SMALL = "it is relative to the kinetic energy, which is a thousandth of the stored energy"
+_FIXED = "Runge-Kutta 4 at fixed steps of 1 ms, without events"
 _THOUSANDFOLD = 1e-6
 _EXACT_THERE = ("energy_integrator", "final_lam")  # numbers of a run that fixed steps leave as they are
-_LOCATED = "Runge-Kutta 4 with located events, twenty steps in half a period of the law, from impact to impact"
+_LOCATED = "Runge-Kutta 4 with located events, twenty steps in half a period of the law, accumulated over the impacts"
 _FIXED_STEP = {"position": 1e-6, "energy_drift": 2e-5, "lam_impulse": 1e-6, "lam_impulse_path": 1e-6}
 
 
@@ -108,7 +108,7 @@ def _all(wanted: dict[str, tuple[float, str]], bilateral: bool, height: float) -
 
 PARAMETERS = {
     "mass": Parameter(default=1.0, unit="kg", doc="mass of the ball", low=0.0, open_low=True),
-    "gravity": Parameter(default=9.81, unit="m/s^2", doc="towards the floor; 0 for one impact alone", low=0.0),
+    "gravity": Parameter(default=9.81, unit="m/s^2", doc="towards the floor; 0 for a single impact", low=0.0),
     "height": Parameter(default=1.0, unit="m", doc="height of the lowest point at t = 0"),
     "speed": Parameter(default=0.0, unit="m/s", doc="initial speed towards the floor"),
     "a0": Parameter(default=100.0, unit="1/s^2", doc="stiffness of the floor over the mass", low=0.0),

@@ -32,8 +32,8 @@ _TITLES = {
 
 FALLS = 2.5
 """What the limits count on: within so many seconds a fall makes differences grow 2,000 times at most, s."""
-CHAOS = Chaos(until=2.0, why="the robot folds through coincident elbows again and again, with nothing to damp it")
-FOLDS_ON = Chaos(until=FALLS, why="every time that the robot folds through coincident elbows differences grow")
+CHAOS = Chaos(until=2.0, why="the robot folds through coincident elbows repeatedly, without damping")
+FOLDS_ON = Chaos(until=FALLS, why="differences grow every time the robot folds through coincident elbows")
 
 
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:

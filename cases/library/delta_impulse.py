@@ -40,7 +40,7 @@ _TITLES = {
     "light": "a push on the flange of a light robot under constant torques",
     "heavy": "a push on the flange of a heavy robot under constant torques",
     "servos": "a strong push on the flange while servos hold the motors",
-    "dirac": "the same impulse in no time",
+    "dirac": "the same impulse, instantaneous",
 }
 
 
@@ -50,7 +50,9 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
     impulse, length = np.array([p["jx"], p["jy"], p["jz"]]), p["length"]
     if length == 0.0 and p["start"] > 0.0:
-        raise InvalidValue(f"delta_impulse: an impulse in no time (length 0) acts at start = 0; start is {p['start']}.")
+        raise InvalidValue(
+            f"delta_impulse: an instantaneous impulse (length 0) acts at start = 0; start is {p['start']}."
+        )
     v0 = np.zeros(9) if length else pose.kicked(p, q0, impulse)
     force = impulse / length if length else impulse
     return delta.scene(

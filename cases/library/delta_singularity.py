@@ -21,7 +21,9 @@ PARAMETERS = {
     **delta.ROBOT,
     "start_angle": Parameter(default=math.pi / 4, unit="rad", doc="motor angles at t = 0"),
     "ramp": Parameter(default=4.0, unit="s", doc="time in which the servos move", low=0.0, open_low=True),
-    "offset": Parameter(default=0.0, unit="rad", doc="where they end, from the pose with coincident elbows"),
+    "offset": Parameter(
+        default=0.0, unit="rad", doc=("their final position, relative to the pose with coincident elbows")
+    ),
     **delta.servos(20.0, 2.0),
     "force": Parameter(default=1.0, unit="N", doc="push on the flange along x"),
     "start": Parameter(default=10.0, unit="s", doc="when it begins", low=0.0),

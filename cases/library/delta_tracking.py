@@ -27,7 +27,7 @@ PARAMETERS = {
         default="linearising", doc="on the flange, or PD on the motors", choices=("linearising", "pd")
     ),
     "mass_matrix": Parameter(
-        default="exact", doc="mass felt by the motors; approximate leaves out the reflected constraint force",
+        default="exact", doc="mass seen by the motors; approximate leaves out the reflected constraint force",
         choices=("exact", "approximate"),
     ),
     "kp": Parameter(default=147.0, doc="1/s^2, or N m/rad for pd"),
@@ -36,7 +36,7 @@ PARAMETERS = {
     "clamp": Parameter(default=1.0, unit="m s", doc="bound on the integral of the error", low=0.0, open_low=True),
     "period": Parameter(default=0.88e-3, unit="s", doc="sample time", low=0.0, open_low=True),
     "delay": Parameter(default=1, doc="whole samples between a reading and its torque", low=0, high=1000),
-    "bits": Parameter(default=18, doc="counts a motor turn are 2^bits", low=1, high=52),
+    "bits": Parameter(default=18, doc="counts per motor turn are 2^bits", low=1, high=52),
     "limit": Parameter(default=0.0, unit="N m", doc="bound on each torque; 0 for none", low=0.0),
     **delta.horizon(1.0),
 }  # fmt: skip

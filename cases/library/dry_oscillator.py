@@ -1,4 +1,4 @@
-"""A mass on a spring whose guide has dry friction: each half swing is shorter by the same; it stops off the middle.
+"""A mass on a spring whose guide has dry friction: each half swing is shorter by the same amount; it stops off centre.
 
 With w^2 = k/m and reach = f/k it swings about reach on either side, each half swing shorter by
 twice that, and stays where it stops within reach of the spring's rest. Without a spring it slides
@@ -101,7 +101,7 @@ PARAMETERS = {
     "friction_loss": Parameter(default=1.0, unit="N", doc="bound of the guide's friction", low=0.0, open_low=True),
     "start": Parameter(default=0.17, unit="m", doc="from the spring's rest"),
     "speed": Parameter(default=0.0, unit="m/s", doc="at the start"),
-    "a1": Parameter(default=100.0, unit="1/s", doc="rate at which a slip decays that friction holds", low=0.0),
+    "a1": Parameter(default=100.0, unit="1/s", doc="rate at which the slip of a sticking contact decays", low=0.0),
     "t_end": Parameter(default=4.0, unit="s", doc="horizon", low=0.0, open_low=True),
 }
 
@@ -112,9 +112,9 @@ VARIANTS: dict[str, dict[str, Value]] = {
 }
 
 _TITLES = {
-    "swings": "a mass on a spring swings in a guide with dry friction until that holds it",
+    "swings": "a mass on a spring swings in a guide with dry friction until it sticks",
     "stops": "a body slides in a guide with dry friction and stops",
-    "holds": "dry friction holds a spring that pulls",
+    "holds": "dry friction holds against a spring",
 }
 
 

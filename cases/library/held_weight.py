@@ -1,4 +1,4 @@
-"""Two fingers press on a weight from either side: it hangs by friction, or slips down between them.
+"""Two fingers press a weight from both sides: friction holds it, or it slips down between them.
 
 Both fingers push with a force F; friction bears 2 mu F. Below the weight m g it falls at g - 2 mu
 F/m, above it hangs.
@@ -23,7 +23,7 @@ PARAMETERS = {
     "t_end": Parameter(default=0.2, unit="s", doc="horizon", low=0.0, open_low=True),
     "press": Parameter(default=12.0, unit="N", doc="force of each finger", low=0.0, open_low=True),
     "radius": Parameter(default=0.03125, unit="m", doc="of the fingers' tips", low=0.0, open_low=True),
-    "stiffness": Parameter(default=0.0, unit="N/m", doc="of springs that press instead, 0: none", low=0.0),
+    "stiffness": Parameter(default=0.0, unit="N/m", doc="of springs that press instead; 0 for none", low=0.0),
 }
 
 VARIANTS: dict[str, dict[str, Value]] = {
@@ -33,9 +33,9 @@ VARIANTS: dict[str, dict[str, Value]] = {
 
 _TITLES = {
     "hangs": "two fingers hold a weight by friction",
-    "slips": "a weight slips down between two fingers that press too little",
-    "smooth": "a box falls between two fingers that mirror each other and that unequal springs press",
-    "sprung": "a box slips down between two fingers that mirror each other and that unequal springs press",
+    "slips": "a weight slips down between two fingers that press too weakly",
+    "smooth": "a box falls between two fingers that move symmetrically, pressed by unequal springs",
+    "sprung": "a box slips down between two fingers that move symmetrically, pressed by unequal springs",
 }
 
 

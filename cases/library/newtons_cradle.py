@@ -1,4 +1,4 @@
-"""A row of balls, some of which strike the others: k in, k out, if collisions come one after another.
+"""A row of balls, some of which strike the others: k in, k out, if collisions follow one another.
 
 Sliders are the collision problem alone; pendulums add strings and gravity. Which collision rule is used
 decides what comes out of balls that touch: `collisions`.
@@ -23,11 +23,12 @@ AUTO = "auto"
 
 PARAMETERS = {
     "n": Parameter(default=5, doc="number of balls", low=2, high=1000),
-    "lifted": Parameter(default=1, doc="how many of the leftmost balls strike the others", low=1),
+    "lifted": Parameter(default=1, doc="number of leftmost balls that strike the others", low=1),
     "gap": Parameter(default=0.0, unit="m", doc="between neighbours at rest; 0 for touching"),
     "radius": Parameter(default=0.025, unit="m", doc="radius of a ball", low=0.0, open_low=True),
     "masses": Numbers(default="0.1", unit="kg", doc="of one ball, or of all: 4,2,1", low=0.0, open_low=True),
-    "length": Parameter(default=0.25, unit="m", doc="string, pivot to centre of the ball", low=0.0, open_low=True),
+    "length": Parameter(default=0.25, unit="m", doc=("length of the string, from pivot to centre of "
+        "the ball"), low=0.0, open_low=True),
     "gravity": Parameter(default=9.81, unit="m/s^2", doc="on the pendulums", low=0.0, open_low=True),
     "angle": Parameter(
         default=-0.5, unit="rad", doc="of the lifted strings, counter-clockwise", low=-math.pi, high=0.0
@@ -52,8 +53,8 @@ VARIANTS: dict[str, dict[str, Value]] = {
 
 _TITLES = {
     "sliders": "balls on a line without gravity: the collision problem alone",
-    "pendulums": "pendulums side by side, the leftmost let go",
-    "unequal": "balls on a line, each lighter than the one before, so far apart that pairs collide one by one in time",
+    "pendulums": "pendulums side by side, the leftmost released",
+    "unequal": "balls on a line, each lighter than the one before, so far apart that pairs collide one after another",
 }
 _MECHANISMS = {"unequal": "sliders"}  # of the variants that are not named after theirs
 _UNITS = {"sliders": "m", "pendulums": "rad"}
@@ -76,7 +77,12 @@ def _claims(balls: Row, rule: str) -> tuple[Claim, ...]:
     if rule != "sequential" or balls.e != 1.0 or np.ptp(balls.masses) > 0.0:
         return ()
     return (
-        Claim(metric="balls_out", expected=float(balls.lifted), tier=Tier.A, source=f"{balls.lifted} in, as many out"),
+        Claim(
+            metric="balls_out",
+            expected=float(balls.lifted),
+            tier=Tier.A,
+            source=(f"{balls.lifted} in, {balls.lifted} out"),
+        ),
     )
 
 

@@ -1,4 +1,4 @@
-"""A box falls on a slab on two feet: one corner is caught and softened, then let go by the blow of the other.
+"""A box falls on a slab on two feet: one corner is caught and softened, then released by the impact of the other.
 
 Five constraints between two bodies in a plane, two sets of constants (Bortoff, American Modelica
 Conference 2020): the left corner collides, is handed over to slow CONTACT constants, and is
@@ -31,18 +31,18 @@ PARAMETERS = {
     "slab_half_length": Parameter(default=0.4, unit="m", doc="half the length of the slab", low=0.0, open_low=True),
     "slab_half_height": Parameter(default=0.03, unit="m", doc="half the thickness of the slab", low=0.0, open_low=True),
     "foot": Parameter(default=0.3, unit="m", doc="distance of a foot from the slab's middle", low=0.0, open_low=True),
-    "wall": Parameter(default=0.5, unit="m", doc="place of the wall right of the box"),
+    "wall": Parameter(default=0.5, unit="m", doc="position of the wall right of the box"),
     "gravity": Parameter(default=9.81, unit="m/s^2", doc="downwards", low=0.0, open_low=True),
     "drop": Parameter(default=0.01, unit="m", doc="height of the lower corner above the slab at t = 0", low=0.0),
     "tilt": Parameter(
         default=0.2, unit="rad", doc="angle of the box at t = 0; above 0 its left corner is the lower one",
         low=-1.5, high=1.5,
     ),
-    "x": Parameter(default=0.0, unit="m", doc="place of the box over the slab's middle at t = 0"),
+    "x": Parameter(default=0.0, unit="m", doc="position of the box over the slab's middle at t = 0"),
     "speed_x": Parameter(default=0.0, unit="m/s", doc="sideways speed of the box at t = 0"),
     "speed_y": Parameter(default=0.0, unit="m/s", doc="upward speed of the box at t = 0"),
-    "spin": Parameter(default=0.0, unit="rad/s", doc="rate of turning of the box at t = 0"),
-    "slab_height": Parameter(default=0.0, unit="m", doc="height of the slab above its rest at t = 0"),
+    "spin": Parameter(default=0.0, unit="rad/s", doc="angular velocity of the box at t = 0"),
+    "slab_height": Parameter(default=0.0, unit="m", doc="height of the slab above its rest position at t = 0"),
     "slab_tilt": Parameter(default=0.0, unit="rad", doc="angle of the slab at t = 0", low=-0.5, high=0.5),
     "a0": Parameter(default=1.0, unit="1/s^2", doc="stiffness of CONTACT", low=0.0),
     "a1": Parameter(default=1.0, unit="1/s", doc="damping of CONTACT", low=0.0),
@@ -57,8 +57,8 @@ PARAMETERS = {
 VARIANTS: dict[str, dict[str, Value]] = {"resolved": {}, "frozen": {}}
 _RULES = {"resolved": "resolved", "frozen": "sequential"}
 _TITLES = {
-    "resolved": "a corner is caught and softened, then released by the blow of the other: collisions in real time",
-    "frozen": "a corner is caught and softened, then released by the blow of the other: collisions in no time",
+    "resolved": "a corner is caught and softened, then released by the impact of the other: collisions in real time",
+    "frozen": "a corner is caught and softened, then released by the impact of the other: instantaneous collisions",
 }
 COORDINATES = tuple(
     Coordinate(name=name, unit=unit)
@@ -80,7 +80,7 @@ def start(p: Mapping[str, float]) -> tuple[Floats, Floats]:
         _check_corner(p, q, name, side)
     reach = p["wall"] - p["x"] - a * math.cos(th) + b * math.sin(th)
     if reach < 0.0:
-        raise SceneError(f"red_body: the box starts {-reach:.3g} m deep in the wall; valid: wall + {-reach:.3g} m.")
+        raise SceneError(f"red_body: the box starts {-reach:.3g} m inside the wall; valid: wall + {-reach:.3g} m.")
     return q, np.array([p["speed_x"], p["speed_y"], p["spin"], 0.0, 0.0, 0.0])
 
 
@@ -91,7 +91,7 @@ def _check_corner(p: Mapping[str, float], q: Floats, name: str, side: float) -> 
     c, s = math.cos(q[5]), math.sin(q[5])
     gap, place = c * y - s * x - p["slab_half_height"], c * x + s * y
     if gap < -1e-12:
-        raise SceneError(f"red_body: the {name} corner starts {-gap:.3g} m deep in the slab; a larger drop is valid.")
+        raise SceneError(f"red_body: the {name} corner starts {-gap:.3g} m inside the slab; valid: a larger drop.")
     if abs(place) > p["slab_half_length"]:
         raise SceneError(
             f"red_body: the {name} corner starts {abs(place):.3g} m from the slab's middle; "
@@ -158,7 +158,10 @@ def _order_claims(p: Mapping[str, float], frozen: bool) -> Iterator[Claim]:
     if frozen and fall.touch + fall.rotation + fall.aloft < p["t_end"]:
         return  # a third collision may come
     if frozen:
-        impulse, source = fall.caught + fall.struck, "what stops the left corner, and (1 + e) v / G44 of the right one"
+        impulse, source = (
+            fall.caught + fall.struck,
+            ("the impulse that stops the left corner, and (1 + e) v / G44 of the right one"),
+        )
         yield Claim(metric="collision_impulse", expected=impulse, tier=Tier.A, source=source)
         return
     if p["zeta3"] >= 0.5:

@@ -1,4 +1,4 @@
-"""A block that stands on an edge falls back on its base: friction keeps the edge in its place until then.
+"""A block that stands on an edge falls back onto its base: friction keeps the edge in place until then.
 
 About its lower edge it is an inverted pendulum of length R: with phi of R from the vertical,
 
@@ -97,7 +97,9 @@ PARAMETERS = {
     "t_end": Parameter(default=0.34, unit="s", doc="horizon", low=0.0, open_low=True),
     "width": Parameter(default=0.1, unit="m", doc="half of it", low=0.0, open_low=True),
     "height": Parameter(default=0.5, unit="m", doc="half of it", low=0.0, open_low=True),
-    "tilt": Parameter(default=0.5, doc="at the start, of that at which it balances", low=0.0, high=1.0, open_low=True),
+    "tilt": Parameter(
+        default=0.5, doc=("initial angle, relative to that at which it balances"), low=0.0, high=1.0, open_low=True
+    ),
 }
 
 VARIANTS: dict[str, dict[str, Value]] = {"falls": {}}
@@ -112,4 +114,4 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         block_on_floor(p, block(p).half, planar=True), name="rocking_block", variant=variant, q0=start(p),
         t_end=p["t_end"], parameters=parameters,
     )  # fmt: skip
-    return limits(made, "a block on an edge falls back on its base", PARAMETERS, rocking(p), p)
+    return limits(made, "a block on an edge falls back onto its base", PARAMETERS, rocking(p), p)

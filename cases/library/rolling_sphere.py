@@ -114,7 +114,7 @@ VARIANTS: dict[str, dict[str, Value]] = {
 
 _TITLES = {
     "straight": "a sphere slides until it rolls",
-    "side_spin": "a sphere with side spin goes on a parabola until it rolls",
+    "side_spin": "a sphere with side spin moves on a parabola until it rolls",
 }
 
 

@@ -1,4 +1,4 @@
-"""A block on a slope with friction: it holds, slides and stops, turns, or goes downhill askew.
+"""A block on a slope with friction: it sticks, slides and stops, turns, or slides downhill askew.
 
 x points downhill; q of a block that touches at one place is where it is on the slope. `flat` is a free box
 on its four lower corners.
@@ -22,8 +22,8 @@ PARAMETERS = {
     **NUMBERS,
     "slope": Parameter(default=0.4, doc="tangent of the floor's angle", low=0.0),
     "speed": Parameter(default=1.0, unit="m/s", doc="at the start", low=0.0),
-    "angle": Parameter(default=0.0, unit="deg", doc="of the velocity from downhill", low=-180.0, high=180.0),
-    "radius": Parameter(default=0.1, unit="m", doc="of what touches; half height of the box", low=0.0, open_low=True),
+    "angle": Parameter(default=0.0, unit="deg", doc="of the velocity, from downhill", low=-180.0, high=180.0),
+    "radius": Parameter(default=0.1, unit="m", doc="of the box; also its half height", low=0.0, open_low=True),
 }
 
 VARIANTS: dict[str, dict[str, Value]] = {
@@ -36,8 +36,8 @@ VARIANTS: dict[str, dict[str, Value]] = {
 
 _TITLES = {
     "stops": "a block slides down a slope and stops",
-    "rests": "a block is put on a slope, and holds",
-    "turns": "a block goes up a slope, turns and slides back",
+    "rests": "a block is placed on a slope, and sticks",
+    "turns": "a block slides up a slope, turns and slides back",
     "askew": "a block slides across a slope, turns downhill and stops",
     "flat": "a box slides on four corners and stops with all of them at once",
 }
@@ -45,7 +45,7 @@ _TITLES = {
 
 _BEHIND = Limit(
     metric="event_gap", value=2.0, engine="pinocchio", profile="admm",
-    why="a corner that comes back is seen behind the step in which it pushes: the ways of two of them",
+    why="a returning corner is recorded after the step in which it pushes: the distance moved in two steps",
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""A block between two soft fingers: the robot feels where it is and moves to it, or pushes it.
+"""A block between two soft fingers: the robot feels its position and moves to it, or pushes it.
 
 Two pads with mass, stiffness and damping close on a block that rests off the middle; touch sensors on both
 sides move the reference of the flange, x_ref' = k* (y_R - y_L), in contact and out of it alike (Bortoff,
@@ -30,8 +30,8 @@ VARIANTS: dict[str, dict[str, Value]] = {"axis": {}, "delta": {"release": 4.2, "
 
 _FOREIGN = {"axis": robot_form.ROBOT, "delta": soft.AXIS}
 _TITLES = {
-    "axis": "soft fingers close on a block that is off their middle",
-    "delta": "a delta robot comes down, grasps a block softly, lets it go and rises",
+    "axis": "soft fingers close on a block that is off centre",
+    "delta": "a delta robot descends, grasps a block softly, releases it and rises",
 }
 _COORDINATES = {"axis": soft.COORDINATES, "delta": robot_form.COORDINATES}
 

@@ -1,4 +1,4 @@
-"""A block lies on a block on a floor; one is pushed: both rest, go together, or slide on each other.
+"""A block lies on a block on a floor; one is pushed: both rest, move together, or slide on each other.
 
 Which of these it is follows from the push, the masses and both coefficients of friction. The pushes act at
 the centres and tip nothing.
@@ -37,7 +37,7 @@ VARIANTS: dict[str, dict[str, Value]] = {
 }
 
 _TITLES = {
-    "together": "the lower of two blocks is pushed, and both go together",
+    "together": "the lower of two blocks is pushed, and both move together",
     "apart": "the lower of two blocks is pushed away under the upper one",
     "top_slides": "the upper of two blocks is pushed, and the lower one rests",
     "top_drags": "the upper of two blocks is pushed and drags the lower one",
@@ -47,7 +47,7 @@ _TITLES = {
 _LIMITS = (
     Limit(
         metric="event_gap", value=2.0, engine="mujoco", profile="default",
-        why="a row of MuJoCo's is in contact where it pushes, which may begin and end below its surface",
+        why="a row of MuJoCo is in contact while it pushes, which may begin and end below its surface",
     ),
 )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""A cube is tossed on a table: eight corners touch it with friction, slide, hold and lift again.
+"""A cube is tossed onto a table: its eight corners touch with friction, slide, stick and lift again.
 
 By default that of ContactNets (Pfrommer et al. 2020): 0.1048 m, 0.37 kg, coefficient of friction
 0.18. A row is hit with the restitution of its law's constants, and pushes for some milliseconds.
@@ -26,16 +26,16 @@ PARAMETERS = {
     "side": Parameter(default=0.1048, unit="m", doc="of the cube", low=0.0, open_low=True),
     "mass": Parameter(default=0.37, unit="kg", doc="of the cube", low=0.0, open_low=True),
     "inertia": Parameter(default=0.00081, unit="kg m^2", doc="moment of inertia", low=0.0, open_low=True),
-    "off": Parameter(default=0.0, unit="m", doc="of the centre of mass from the middle, along x of the cube"),
-    "height": Parameter(default=0.15, unit="m", doc="of the middle at the start", low=0.0, open_low=True),
+    "off": Parameter(default=0.0, unit="m", doc="offset of the centre of mass from the middle, along x of the cube"),
+    "height": Parameter(default=0.15, unit="m", doc="height of the middle at the start", low=0.0, open_low=True),
 }
 
 VARIANTS: dict[str, dict[str, Value]] = {"slides": {}, "tumbles": {"mu": 0.6}, "loaded": {"off": 0.02, "t_end": 0.3}}
 
 _TITLES = {
-    "slides": "a cube is tossed on a table on which it slides",
-    "tumbles": "a cube is tossed on a table on which it rolls over its edges",
-    "loaded": "a cube whose centre of mass is not in its middle is tossed on a table",
+    "slides": "a cube is tossed onto a table and slides on it",
+    "tumbles": "a cube is tossed onto a table and rolls over its edges",
+    "loaded": "a cube with an off-centre mass is tossed onto a table",
 }
 TURNED = np.array([[0.4, -0.3, 0.2]])  # rotation vector at the start, rad
 THROWN = (0.8, -0.3, 0.0, 3.0, 2.0, -1.0)  # velocities at the start, m/s and rad/s

@@ -100,8 +100,8 @@ class Dart(Engine):
     name = "dart"
     profiles: Mapping[str, str] = {
         "matched": "the restitution of the law's linear part, own step (1 ms) and solver (Dantzig): first order; "
-        "of solids with friction DART's own detector, which has boxes as they are, and nothing sleeps",
-        "default": "as it comes: no restitution, FCL's detector, which has meshes; scenes with friction alone",
+        "for solids with friction DART's own detector, which treats boxes as boxes, and nothing is put to sleep",
+        "default": "default: no restitution, FCL's detector, which supports meshes; only for scenes with friction",
     }
     hidden = HIDDEN
     versions: Mapping[str, str] = {"dartpy": dartpy.__version__}
@@ -114,9 +114,7 @@ class Dart(Engine):
         if case.scene is not None and frictional(case.scene):
             return why_beside("DART", case) or _contacts.why_not(case.scene, DETECTOR[profile])
         if profile == "default":
-            return (
-                "Without friction DART differs from the profile matched by its restitution alone, which is a setting."
-            )
+            return "Without friction it differs from the profile matched only in its restitution, which is a setting."
         return why_not("DART", case) or no_rigid_contact(case)
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **given: Any) -> Run:
@@ -141,7 +139,7 @@ class Dart(Engine):
             "detector": Parameter(
                 default=DETECTOR[profile], choices=tuple(_contacts.DETECTORS), doc="what finds contacts"
             ),
-            "sleep": Parameter(default=not matched, doc="whether what rests is put to sleep", low=0, high=1),
+            "sleep": Parameter(default=not matched, doc="whether bodies at rest are put to sleep", low=0, high=1),
             "max_steps": STEPS,
         }  # fmt: skip
         used = _settings.chosen(self.name, profile, known, given)

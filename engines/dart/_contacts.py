@@ -46,10 +46,16 @@ def why_not(scene: Scene, detector: str) -> str | None:
         return "DART has no tendons between points."
     for contact in contacts(scene):
         if contact.second.type not in SOLIDS:
-            return f"DART is given solids of {', '.join(SOLIDS)}; {contact.second.name!r} is a {contact.second.type}."
+            return (
+                f"DART is given only solids of type {', '.join(SOLIDS)}; {contact.second.name!r} is a "
+                f"{contact.second.type}."
+            )
         for shape in (contact.first, contact.second):
             if detector == "fcl" and shape.type == "capsule":
-                return f"DART with FCL's detector takes the capsule {shape.name!r} for a sphere; its own has capsules."
+                return (
+                    f"DART with FCL's detector treats the capsule {shape.name!r} as a sphere; its own "
+                    "detector has capsules."
+                )
     return None
 
 
@@ -281,7 +287,7 @@ class Rubs:
         return {
             "masses": masses(self.scene, own), "gravity": float(np.linalg.norm(self.world.getGravity())),
             "M": M, "bias": bias, "q0": self.case.q0, "v0": self.case.v0,
-            "hidden": dict.fromkeys(RIGID, "Its contacts are rigid: they are solved for within a step."),
+            "hidden": dict.fromkeys(RIGID, "Its contacts are rigid, and are solved within a step."),
         }  # fmt: skip
 
     def counts(self) -> Mapping[str, int]:

@@ -34,7 +34,7 @@ from crossbody.engines.drake._simulate import Sim
 THICK = 10.0  # sides of the box that stands for a plane, m
 SCHEMES = ("runge_kutta5", "runge_kutta3", "bogacki_shampine3", "radau3")
 USUAL_SCHEME, USUAL_ACCURACY = "runge_kutta3", 1e-4  # what a Simulator of 1.51.1 starts with
-RUBS = RIGID, "Contacts of a discrete plant are its own, and solved for within a step."
+RUBS = RIGID, "Contacts of a discrete plant follow its own law, and are solved within a step."
 
 
 def plant(scene: Line, dt: float) -> tuple[Any, Any]:
@@ -123,8 +123,8 @@ def _ended(
     if told:
         return Outcome.STEP_TOO_SMALL, f"Drake says: {told}"
     if t[-1] < case.t_end:
-        return Outcome.STEP_LIMIT, f"{max_steps} steps were not enough"
-    return ended(scene, q[-1], v[-1]), "the state left what the scene can reach"
+        return Outcome.STEP_LIMIT, f"{max_steps} steps did not reach the horizon"
+    return ended(scene, q[-1], v[-1]), "the state left the region that the scene can reach"
 
 
 def _multipliers(scene: Line, sim: Sim, t: Floats, x: Floats, dt: float) -> Floats:
@@ -145,7 +145,7 @@ class Drake(Engine):
     name = "drake"
     profiles: Mapping[str, str] = {
         "matched": "the case's law as a symbolic system, Runge-Kutta 5 with error control at a tight accuracy; "
-        "memoryless, every row as if it were alone",
+        "memoryless, each row independent of the others",
         "continuous": "a MultibodyPlant in continuous time, point contact with the law's stiffness, the simulator's "
         "own integrator (Runge-Kutta 3) and accuracy (1e-4)",
         "default": "a discrete MultibodyPlant with steps of 1 ms and point contact with the law's stiffness",
@@ -162,7 +162,7 @@ class Drake(Engine):
             return why_beside("Drake", case) or _scene.why_not(case.scene, profile)
         reason = why_not("Drake", case)
         if reason is None and profile != "matched" and not case.law.unilateral.all():
-            return "A contact of a MultibodyPlant pushes only: a row that is always on is none."
+            return "A contact of a MultibodyPlant only pushes, so a row that is always active cannot be one."
         if reason is None and profile != "matched" and not float(line(case).a0[0]) > 0.0:
             return "A contact of a MultibodyPlant needs a stiffness above 0."
         return reason
@@ -217,7 +217,7 @@ def _known(case: Case, profile: str) -> dict[str, Parameter]:
         step = Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True)
         return {"dt": step, "max_steps": steps}
     default = 1e-11 if profile == "matched" else USUAL_ACCURACY
-    accuracy = Parameter(default=default, doc="accuracy that is asked for", low=1e-14, high=1e-1)
+    accuracy = Parameter(default=default, doc="requested accuracy", low=1e-14, high=1e-1)
     scheme = Parameter(default=SCHEMES[0], doc="integration scheme", choices=SCHEMES)
     return {"rtol": accuracy, "max_steps": steps} | ({"scheme": scheme} if profile == "matched" else {})
 
@@ -233,12 +233,12 @@ def _stepped(case: Case, profile: str) -> dict[str, Parameter]:
         "stiction": Parameter(
             default=HOLDS if matched else STICTION,
             unit="m/s",
-            doc="slip that holds; not of sap",
+            doc="slip speed below which contacts stick; not for sap",
             low=0.0,
             open_low=True,
         ),
         "stiffness": Parameter(
-            default=STIFF if matched else 0.0, unit="N/m", doc="of contacts; 0: Drake's own", low=0.0
+            default=STIFF if matched else 0.0, unit="N/m", doc="of contacts; 0: Drake's default", low=0.0
         ),
         "max_steps": Parameter(default=1_000_000, doc="bound on the number of steps", low=1, high=1e9),
     }

@@ -34,7 +34,7 @@ NO_ROWS = "a MultibodyPlant in continuous time has no rows."
 FIRST = 1e-5
 """First step of the matched profile, s: in Drake's own, .01, a force that grows with the cube of
 a rate may overflow before the error is seen."""
-SOFT = "Bounds of a MultibodyPlant in discrete time are its own springs and dampers, of which it tells no forces."
+SOFT = "Bounds of a MultibodyPlant in discrete time are its own springs and dampers, whose forces it does not report."
 
 
 def hidden(profile: str) -> dict[str, str]:
@@ -46,7 +46,7 @@ def why_not(scene: Scene, profile: str) -> str | None:
     """Return why a scene has no motion in a plant; None if it has one."""
     if frictional(scene):
         if profile == "continuous":
-            return "Friction is in Drake's discrete plants here: the profiles matched and default."
+            return "Friction is supported in Drake's discrete plants here: the profiles matched and default."
         if found := why_no_steps("Drake", scene, bounds=True):
             return found
     elif scene.loops:
@@ -54,7 +54,9 @@ def why_not(scene: Scene, profile: str) -> str | None:
     forces = Forces(scene)
     for joint in scene.joints:
         if joint.type in ("ball", "free") and forces.armature[forces.moved(joint)].any():
-            return f"Drake's rotor inertia is of one axis; the joint {joint.name!r} of type {joint.type} has armature."
+            return (
+                f"Drake's rotor inertia is about one axis; the joint {joint.name!r} of type {joint.type} has armature."
+            )
     return None
 
 
@@ -216,16 +218,16 @@ class SceneRun(Run):
             place = f"t = {log.motion[-1][0]:g} s"
             if met:
                 raise CaseUnsupported(
-                    f"The row {met!r} acts before {place}, and {self._lacks()} Up to there it runs: t_end."
+                    f"The row {met!r} acts before {place}, and {self._lacks()} It can run up to there: set t_end."
                 )
             if told:
                 return Outcome.STEP_TOO_SMALL, f"{place}: Drake says: {told}"
             if log.motion[-1][0] < end:
-                return Outcome.STEP_LIMIT, f"{place}: {limit} steps were not enough."
+                return Outcome.STEP_LIMIT, f"{place}: {limit} steps did not reach the horizon."
         return Outcome.FINISHED, ""
 
     def _lacks(self) -> str:
-        return "contacts of a scene are not built in Drake." if self.profile == "default" else NO_ROWS
+        return "contacts of a scene are not supported in Drake." if self.profile == "default" else NO_ROWS
 
     def _met(self, q: Floats) -> str:
         """Return the row that a motion has reached; empty if it has reached none."""

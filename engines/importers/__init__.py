@@ -285,8 +285,8 @@ def missing(absent: Sequence[str]) -> str:
     wanted = dict.fromkeys(getattr(module, "INSTALL", module.PACKAGE) for module in modules)
     packages = " ".join(map(shlex.quote, wanted))
     return (
-        f"Not installed: {', '.join(absent)}. pip install {packages} brings what is missing, here "
-        f"or in an environment whose python is named: CROSSBODY_PYTHON_{absent[0].upper()}=PATH."
+        f"Not installed: {', '.join(absent)}. pip install {packages} installs what is missing, here or in "
+        f"an environment whose python is named: CROSSBODY_PYTHON_{absent[0].upper()}=PATH."
     )
 
 

@@ -15,12 +15,12 @@ class _Robot:
     free, ball = "rotation vector, p; world, world", "rotation vector; body"
     hidden = {  # noqa: RUF012
         "armature": "DART's joints have no armature.",
-        "actuators": "DART's reader makes no actuators of a file.",
+        "actuators": "DART's reader ignores actuators of a file.",
         "damping v|v|": "DART's dampers are linear.", "damping v^3": "DART's dampers are linear.",
         "stiffness x^2": "DART's springs are linear.",
         "stiffness x^3": "DART's springs are linear.", "tendons": "DART has no tendons.",
         "softness": "DART's rows have no solref.", "keyframes": "DART has no keyframes.",
-        **dict.fromkeys(("spin", "roll", "margin"), "DART's contacts have sliding friction alone."),
+        **dict.fromkeys(("spin", "roll", "margin"), "DART's contacts have only sliding friction."),
     }  # fmt: skip
 
     def __init__(self, path: str, urdf: bool) -> None:

@@ -21,7 +21,7 @@ class _Robot:
         "damping v|v|": "Drake's dampers are linear.", "damping v^3": "Drake's dampers are linear.",
         "stiffness x^2": "Drake's springs are linear.", "stiffness x^3": "Drake's springs are linear.",
         **dict.fromkeys(FORCES, BOUNDED), "softness": "Drake's rows have no solref.",
-        **dict.fromkeys(("spin", "roll", "margin"), "Drake's contacts have sliding friction alone."),
+        **dict.fromkeys(("spin", "roll", "margin"), "Drake's contacts have only sliding friction."),
     }  # fmt: skip
 
     def __init__(self, path: str, urdf: bool) -> None:

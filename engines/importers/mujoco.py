@@ -12,7 +12,7 @@ FORMATS, PACKAGE, MODULE, TRIED = ("mjcf", "urdf"), "mujoco", "mujoco", ("4.0", 
 KINDS = ("free", "ball", "slide", "hinge")
 SHAPES = ("plane", "field", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
 FAR = 1e12  # margin of a bound with which its row is there wherever it is, m or rad
-FUSED = "MuJoCo's compiler makes links of a URDF that no joint moves one with what they stand on (fusestatic)."
+FUSED = "MuJoCo's compiler merges links of a URDF that no joint moves with their parents (fusestatic)."
 
 
 class _Robot:

@@ -24,9 +24,9 @@ class _Robot:
         "keyframes": "Newton has no keyframes.",
     }  # fmt: skip
     unseen = {  # noqa: RUF012
-        "energy": "Newton tells no energy.", "tendons": "Newton keeps tendons for its MuJoCo solver alone.",
+        "energy": "Newton does not report energy.", "tendons": "Newton keeps tendons only for its MuJoCo solver.",
         "surfaces": "Newton's solvers mix the friction of two shapes, each in its own way.",
-        "softness": "Newton keeps solref for its MuJoCo solver alone.",
+        "softness": "Newton keeps solref only for its MuJoCo solver.",
     }  # fmt: skip
     precision = 2e-4
 
@@ -105,7 +105,7 @@ class _Robot:
         kept = [getattr(own, f"actuator_{key}").numpy() for key in ("trntype", "trnid", "gear", "gainprm", "biasprm")]
         moved = {joint[4]: joint for joint in self.joints}
         if kept[0].any() or any(dof not in moved for dof in kept[1][:, 0]):
-            self.unseen = self.unseen | {"actuators": "Newton keeps actuators of tendons for its MuJoCo solver alone."}
+            self.unseen = self.unseen | {"actuators": "Newton keeps actuators of tendons only for its MuJoCo solver."}
             return
         for label, dof, gear, gain, bias in zip(labels, *(part for part in kept[1:]), strict=True):
             name = label.rpartition("/")[2]

@@ -34,7 +34,7 @@ class _Robot:
         "damping v^3": "Pinocchio's dampers are linear.",
         "actuators": "Pinocchio's model has no actuators.", "tendons": "Pinocchio's model has no tendons.",
         "surfaces": "Pinocchio's shapes have no friction.",
-        "softness": "Pinocchio's reader leaves solref out.",
+        "softness": "Pinocchio's reader ignores solref.",
     }  # fmt: skip
 
     def __init__(self, path: str, urdf: bool) -> None:
@@ -62,7 +62,7 @@ class _Robot:
             self._shapes = list(read.geometryObjects)
         except Exception as error:  # shapes are read by a call of their own
             said = str(error).strip().rpartition("message:")[2].strip().rstrip(".")
-            self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes gives up: {said}."}
+            self.unseen = self.unseen | {"shapes": f"Pinocchio's reader of shapes fails: {said}."}
             self.refused = ("shapes",)
         self._bodies = [f for f in self._m.frames if f.type == pin.FrameType.BODY]
         self._last: dict[int, str] = {}

@@ -23,9 +23,9 @@ class _Robot:
         "tendons": "PyBullet has no tendons.", "softness": "PyBullet's rows have no solref.",
     }  # fmt: skip
     unseen = {  # noqa: RUF012
-        "energy": "PyBullet tells no energy.",
-        "contacts": "PyBullet does not tell which of its shapes may touch.",
-        "surfaces": "PyBullet does not tell which of its shapes may touch.",
+        "energy": "PyBullet does not report energy.",
+        "contacts": "PyBullet does not report which of its shapes may touch.",
+        "surfaces": "PyBullet does not report which of its shapes may touch.",
     }  # fmt: skip
     precision = 1e-5
 

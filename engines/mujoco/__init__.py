@@ -1,4 +1,4 @@
-"""MuJoCo: soft contacts with its constants as they come, or matched to the case's law."""
+"""MuJoCo: soft contacts with default constants, or matched to the case's law."""
 
 from __future__ import annotations
 
@@ -81,21 +81,23 @@ class Mujoco(Engine):
     name = "mujoco"
     profiles: Mapping[str, str] = {
         "matched": "the case's own law, regularisation removed, Runge-Kutta 4 with located events",
-        "default": "the obvious model: contact constants, integrator (Euler) and step (2 ms) as MuJoCo sets them",
+        "default": "the obvious model: MuJoCo's default contact constants, integrator (Euler) and step (2 ms)",
         "as_is": "an unchanged robot file: its own step, integrator, solref, solimp and cone",
     }
     of_scenes: Mapping[str, str] = {"default": "as_is"}
     versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
     orders: Mapping[str, float] = {"matched": 4.0, "default": 1.0, "as_is": 1.0}
     interpreted: Mapping[str, str] = {
-        "matched": "the loop over steps, the record, the search for events, what solref cannot say of the law",
+        "matched": (
+            "the loop over steps, the record, the search for events, the part of the law that solref cannot express"
+        ),
         "default": "the loop over steps, the record",
         "as_is": "the loop over steps, the record",
     }
     hidden: Mapping[str, Mapping[str, str]] = {
         "*": {"ledger": "MuJoCo's steps keep no account of the work of its forces."},
-        "default": {"H": "The obvious model's contacts are pairs of shapes, with frames of their own."},
-        "as_is": {"H": "The file's contacts are pairs of shapes, with frames of their own."},
+        "default": {"H": "The contacts of the obvious model are pairs of shapes with their own frames."},
+        "as_is": {"H": "The contacts of the file are pairs of shapes with their own frames."},
     }
 
     def why_not(self, case: Case, profile: str) -> str | None:

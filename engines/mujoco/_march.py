@@ -213,7 +213,7 @@ class March:
             if t > last:
                 opt.timestep = t_end - t
             if self.steps == self.max_steps:
-                return self._end(Outcome.STEP_LIMIT, f"{self.max_steps} steps of {dt:g} s were not enough")
+                return self._end(Outcome.STEP_LIMIT, f"{self.max_steps} steps of {dt:g} s did not reach the horizon")
             advance()
             forward(model, data)
             self.steps += 1
@@ -223,7 +223,7 @@ class March:
             if modes() != now:
                 t = self._event(before)
                 if self.still > SAME_INSTANT:
-                    return self._end(Outcome.MODE_CYCLE, f"rows {now} and {self.now} switch for ever")
+                    return self._end(Outcome.MODE_CYCLE, f"rows {now} and {self.now} switch forever")
                 now, opt.timestep = self.now, dt
             record(lam(), now)
             if why := lost():
@@ -267,7 +267,9 @@ class March:
         data = self.scene.data
         if finite := all(bool(np.isfinite(x).all()) for x in (data.qpos, data.qvel, data.qacc)):
             self.tape.record(self.scene.lam(), self.now)
-        return self._end(Outcome.DIVERGED if finite else Outcome.NOT_FINITE, "the state left what the scene can reach")
+        return self._end(
+            Outcome.DIVERGED if finite else Outcome.NOT_FINITE, ("the state left the region that the scene can reach")
+        )
 
     def _end(self, outcome: Outcome, what: str) -> bool:
         data = self.scene.data

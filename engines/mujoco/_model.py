@@ -60,7 +60,7 @@ DEPENDENT = 1e-6
 CONES = {
     "cone": Parameter(default="own", choices=("own", *CONE), doc="cone of friction; own: the model's"),
     "impratio": Parameter(default=0.0, doc="friction's stiffness over that of normals; 0: the model's", low=0.0),
-    "noslip": Parameter(default=-1, doc="iterations that take slip out; -1: the model's", low=-1, high=1e6),
+    "noslip": Parameter(default=-1, doc="iterations that remove slip (noslip); -1: the model's", low=-1, high=1e6),
     "timeconst": Parameter(default=0.0, unit="s", doc="time constant of contacts (solref); 0: the model's", low=0.0),
 }
 """Of models with friction."""
@@ -68,24 +68,22 @@ OF_FORCE = 1.5
 """Time constants of what answers to a force that a step may be long: Runge-Kutta 4 is stable up to 2.8."""
 SOFT = "The file's rows are soft: their law varies with depth."
 OWN_CONTACTS = (
-    "MuJoCo has no row for what this case has beside its shapes, as rolling on the face of a "
-    "ring: what its own contacts make of the shapes is the profile default."
+    "MuJoCo has no row for parts of this case that are not shapes, such as rolling on the face of "
+    "a ring; its own contacts are the profile default."
 )
-HIDDEN = "MuJoCo has a row for a bound only where it acts."
+HIDDEN = "MuJoCo has a row for a bound only while it acts."
 
 
 def why_not(case: Case, profile: str) -> str | None:
     """Return why a profile cannot do it: no file to take as it stands, or one that MuJoCo does not read."""
     if profile == "default" and case.file:
-        return (
-            "What MuJoCo makes of a robot file by itself is the profile as_is; default is that of scenes without one."
-        )
+        return "The profile as_is runs a robot file unchanged; default is for scenes without a file."
     if profile != "default" and case.gates is not None:
         return OWN_CONTACTS
     if profile == "matched" and case.scene is not None and (found := frictional(case.scene)):
         return found
     if profile == "matched" and case.fsm != "level":
-        return f"Rows of a scene in MuJoCo switch by the machine 'level' and not by {case.fsm!r}."
+        return f"Rows of a scene in MuJoCo switch by the machine 'level', not by {case.fsm!r}."
     if profile != "as_is":
         return None
     if not case.file:

@@ -1,4 +1,4 @@
-"""Pinocchio: the case's law by its constrained dynamics, impacts in no time, or an LCP in time steps."""
+"""Pinocchio: the case's law by its constrained dynamics, instantaneous impacts, or an LCP in time steps."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ RTOL = Parameter(default=1e-10, doc="relative tolerance", low=1e-14, high=1e-1)
 METHODS, AUTO = ("Adams", "BDF"), "auto"
 METHOD = Parameter(default="Adams", doc="linear multistep method of CVODE", choices=METHODS)
 METHOD_OF_STIFF = replace(
-    METHOD, default=AUTO, doc="that, or auto: which goes further by a right-hand side", choices=(AUTO, *METHODS)
+    METHOD,
+    default=AUTO,
+    doc=("that, or auto: the one that advances further per right-hand side"),
+    choices=(AUTO, *METHODS),
 )
 OF_GATES = replace(RTOL, default=1e-12), replace(METHOD, default="BDF")
 """A ball that rests on a face is stiff; and what a switch latches of a place, as the angle that a
@@ -43,7 +46,7 @@ controller goes to, stays off by the error that it had: of 1e-10 three microseco
 a minute in the maze."""
 TRIED = 250
 """Steps by which the methods are compared: their start, at order 1, takes less than half of them."""
-SOLVER = Parameter(default="forwardDynamics", doc="how v' and lam are solved for", choices=tuple(ALGEBRA))
+SOLVER = Parameter(default="forwardDynamics", doc="how v' and lam are computed", choices=tuple(ALGEBRA))
 
 
 class Solver(Protocol):
@@ -89,9 +92,11 @@ class Pinocchio(Engine):
     name = "pinocchio"
     profiles: Mapping[str, str] = {
         "law": "the case's law solved for v' and lam by forwardDynamics, CVODE, the level machine",
-        "impulse": "impacts in no time with the restitution of the law's linear part, one after another; rigid contact "
-        "once captured",
-        "impulse_simultaneous": "the same with all touching contacts struck at once, as a complementarity problem",
+        "impulse": "instantaneous impacts with the restitution of the law's linear part, one after another; rigid "
+        "contact once captured",
+        "impulse_simultaneous": (
+            "the same, with collisions of all touching contacts solved together as a complementarity problem"
+        ),
         "admm": "time stepping with ADMM, the LCP baseline: first order, restitution of the law's linear part",
     }
     versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": solvers.VERSION}
@@ -117,11 +122,11 @@ class Pinocchio(Engine):
         if profile == "admm" and (closed or not case.contacts):
             return "The profile admm steps contacts in time: this case has loops in space, or no contact."
         if profile in RULES and not (opens.any() and opens.all()):
-            return "An impact needs a contact that opens: a row that is always on has none."
+            return "An impact needs a contact that can open: a row that is always active has none."
         if profile == "impulse_simultaneous" and int(case.law.unilateral.sum()) < 2:
-            return "One contact collides with no other: the profile impulse is the same."
+            return "There is only one contact, so the profile impulse is the same."
         if profile == "law" and case.fsm != "level":
-            return f"The profile law switches by the machine 'level' and not by {case.fsm!r}."
+            return f"The profile law switches by the machine 'level', not by {case.fsm!r}."
         return None
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> Run:

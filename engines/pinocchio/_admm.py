@@ -96,7 +96,9 @@ class TimeStepper:
         self.log.add(t, q, v, self.none, modes)
         while t_end - t > 1e-9 * dt:
             if self.steps >= self.max_steps:
-                return self._end(Outcome.STEP_LIMIT, t, q, v, f"{self.max_steps} steps of {dt:g} s were not enough")
+                return self._end(
+                    Outcome.STEP_LIMIT, t, q, v, (f"{self.max_steps} steps of {dt:g} s did not reach the horizon")
+                )
             tau = min(dt, t_end - t)
             closed = self._closed(q, v, tau)
             new, p = self._step(q, v, closed, tau)

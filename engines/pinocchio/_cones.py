@@ -169,7 +169,7 @@ class Cones:
         return mechanics(self.case.scene, self.bodies) | {
             "gravity": float(np.linalg.norm(self.bodies.model.gravity.linear)),
             "q0": self.case.q0, "v0": self.case.v0,
-            "hidden": dict.fromkeys(RIGID, "Its contacts are rigid: they are solved for within a step."),
+            "hidden": dict.fromkeys(RIGID, "Its contacts are rigid, and are solved within a step."),
         }  # fmt: skip
 
     def counts(self) -> Mapping[str, int]:

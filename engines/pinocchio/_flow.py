@@ -115,7 +115,7 @@ class Flow:
         stop, asked = end, t
         while t < end and self.outcome.ok:
             if self.steps >= self.max_steps:
-                return self._end(Outcome.STEP_LIMIT, t, y, f"{self.max_steps} steps were not enough")
+                return self._end(Outcome.STEP_LIMIT, t, y, f"{self.max_steps} steps did not reach the horizon")
             step = self.solver.step(stop, method="onestep", tstop=stop)
             self.steps += 1
             if not self._sound(step, t, y):
@@ -135,7 +135,7 @@ class Flow:
                 bad = Outcome.MODE_CYCLE if fired or turned else Outcome.STEP_TOO_SMALL
                 gone = "" if fired or turned else self._vanished(y)
                 bad = Outcome.ILL_POSED if gone else bad
-                return self._end(bad, t, y, gone or f"the time does not move on (rows {modes})")
+                return self._end(bad, t, y, gone or f"time does not advance (rows {modes})")
             if turned or self.modes != modes or not np.array_equal(y, step.y):
                 self.solver.init_step(t, y)
         return y
@@ -146,7 +146,7 @@ class Flow:
         on = [i for i, mode in enumerate(self.modes) if mode in ACTIVE]
         before, now = (np.diag(self.rows.delassus(at))[on] for at in (self.start, q))
         gone = [i for i, a, b in zip(on, before, now, strict=True) if b < VANISHED * a]
-        return f"hardly anything moves rows {gone} any more, which have to move" if gone else ""
+        return f"almost nothing can move rows {gone}, which must move" if gone else ""
 
     def _fired(self, step: Any) -> tuple[Fired, frozenset[int]]:
         """(row, function) of every function that fell to zero, and pairs that lie the other way."""
@@ -167,7 +167,7 @@ class Flow:
         elif not math.isfinite(step.y.sum()):
             self._end(Outcome.NOT_FINITE, t, y, "the next state is not finite")
         elif not self.world.safe(step.y[: self.n], step.y[self.n :]):
-            self._end(Outcome.DIVERGED, t, y, "the state left what the scene can reach")
+            self._end(Outcome.DIVERGED, t, y, "the state left the region that the scene can reach")
         return self.outcome.ok
 
     def _switch(

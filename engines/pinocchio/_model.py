@@ -49,9 +49,9 @@ def why_not(case: Case, profile: str) -> str | None:
     if profile != "law" and case.gates is not None:
         return f"The profile {profile} has no rows that hand a contact over where a wall ends, as at the maze's gaps."
     if profile != "law" and case.force is not None:
-        return "What acts here feels forces that are finite: impacts and time stepping have impulses instead."
+        return "This case depends on finite forces; impacts and time stepping have impulses instead."
     if profile != "law" and case.general:
-        return "The rows of a scene follow the law: impacts in no time and time stepping have none."
+        return "The rows of a scene follow the law, which instantaneous impacts and time stepping do not have."
     return None
 
 

@@ -137,8 +137,8 @@ class ClockCheck:
         """What is wrong with the clock, faults first."""
         found = [
             (self._finite, "time", "the time is not a finite number", True),
-            (self._back, "time", "the time goes back; it must increase from row to row", True),
-            (self._same, "time", "the time stands still; drop_duplicates removes such rows", True),
+            (self._back, "time", "time decreases; it must increase from row to row", True),
+            (self._same, "time", "time does not advance; drop_duplicates removes such rows", True),
             (self._dropped, "dropped", f"{self.missing} samples are missing in {self._dropped.count} places", False),
             (self._jitter, "jitter", f"steps differ from {self.step:.6g} s by more than a tenth; scatter of the clock "
              f"{self.jitter:.3g} s", False),
@@ -151,7 +151,7 @@ class ClockCheck:
 
     def _unit_is_wrong(self) -> list[Finding]:
         if self.given is None and self.median >= NO_RIGS:
-            text = f"the step is {self.median:.6g} s, as no rig's; is the unit of time right?"
+            text = f"the step is {self.median:.6g} s, which no rig has; is the unit of time right?"
             return [Finding(check="sample_time", fault=False, channel="time", row=0, t=self.start, count=1, text=text)]
         if self.given is None or not self._early:
             return []

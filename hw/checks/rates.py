@@ -31,7 +31,7 @@ MOST_ALIKE = 0.99  # correlation of what neighbouring spans are apart by
 UNRESOLVED = 2.0  # sample times that a change of the rate may be early or late by
 UNITS = {
     "degrees taken for radians": TURN / 360.0, "radians taken for degrees": 360.0 / TURN,
-    "turns a minute taken for radians a second": TURN / 60.0, "turns taken for radians": TURN,
+    "revolutions per minute mistaken for radians per second": TURN / 60.0, "turns taken for radians": TURN,
     "millimetres taken for metres": 1e-3, "metres taken for millimetres": 1e3,
 }  # fmt: skip
 
@@ -197,7 +197,7 @@ class RateCheck:
             return [self._told("delay", text, row, t)]
         off = max(OFF, SURE * unsure)
         if gain > 1.0 + off or gain / max(alike, 1e-9) < 1.0 - off:
-            far = f"{gain:.4g} (+- {2.0 * unsure:.2g}) times as far as its velocity says"
+            far = f"{gain:.4g} (+- {2.0 * unsure:.2g}) times as far as the integral of its velocity"
             text = f"the coordinate moves {far}: is a scale off?"
             return [self._told("gain", text, row, t)]
         return []

@@ -77,7 +77,7 @@ def identify(
     cut = [window for one in logs for window in windows(one, chosen, restart, delay, horizon)]
     held = [i for i in range(len(cut)) if hold and i % hold == hold - 1]
     if not (fitted := [i for i in range(len(cut)) if i not in held]):
-        raise SceneError("No window is left to fit; hold fewer out, or restart more often.")
+        raise SceneError("No window is left to fit; hold out fewer, or restart more often.")
     kind: Any = Exact if chosen.places and not engine else Differences
     more = (engine,) if kind is Differences else ()
     joint = starts == "free" or (starts == "auto" and kind is Exact and _bearable([cut[i] for i in fitted], stride))

@@ -22,9 +22,9 @@ from crossbody.hw.models.contract import Model
 TOGETHER = 0.999  # correlation from which on two parameters are told apart by nothing but noise
 ERRORS = ("rmse", "end_median", "end_90")
 EFFECTIVE = 4.0  # degrees of freedom below which a standard deviation is itself hardly known
-MEASURED = "The windows start as measured: no interval counts the noise of a start; {}."
+MEASURED = "The windows start from measured states, whose noise the intervals do not include; {}."
 COUNTED = 'with starts="free" they would'
-NEVER = "where contacts open the starts cannot be unknowns"
+NEVER = "if contacts open, initial states cannot be unknowns"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -164,8 +164,10 @@ def _narrow(search: Search, halves: Mapping[int, float]) -> dict[int, str]:
     fixed = [*found.kept, *np.flatnonzero(found.active).tolist()]
     told = moves(problem, found.x[:count], search.sizes[:count], fixed)
     return {
-        i: f"its interval of +- {halves[i]:.2g} is from windows that start as measured, and a first step to free "
-        f"starts changes it by {move.by:+.2g}"
+        i: (
+            f"its interval of +- {halves[i]:.2g} is from windows that start from measured states, and one step "
+            f"towards free starts changes it by {move.by:+.2g}"
+        )
         for i, move in told.items()
         if move.refuted and abs(move.by) > halves[i]
     }
@@ -181,7 +183,11 @@ def _unseen(
         words = in_words(row, names)
         part = [n for n, weight in zip(names, row, strict=True) if weight != 0.0]
         fix = next((n for n in kept if n in part), part[0])
-        one = f"The data do not see {words}" if len(part) == 1 else f"The data do not see one combination: {words}"
+        one = (
+            f"{words} have no effect on the data"
+            if len(part) == 1
+            else (f"One combination has no effect on the data: {words}")
+        )
         found[f"{one}. Fix one of them, for example {fix}." if len(part) > 1 else f"{one}: fix it."] = words
     seen = [j for j, i in enumerate(own) if not blind[i]]
     if len(seen) > 1 and np.all(spread.std[seen] > 0.0):
@@ -193,7 +199,10 @@ def _unseen(
             words = in_words(row, [names[i] for i in at])
             if np.sum(np.abs(row) > WEIGHT * np.max(np.abs(row))) > 1:
                 found[
-                    f"The data hardly see one combination: {words} cannot be distinguished from zero. Fix one of them."
+                    (
+                        f"One combination has almost no effect on the data: {words} cannot be distinguished from "
+                        "zero. Fix one of them."
+                    )
                 ] = words
     return found
 
@@ -230,15 +239,15 @@ def _warnings(
     if fit.kept:
         rest = [f"{e.name} = {e.value:.4g} [{e.kept_low:.4g}, {e.kept_high:.4g}]" for e in fit.estimates
                 if e.name not in fit.kept and not np.isfinite(e.std)]  # fmt: skip
-        yield f"With {', '.join(fit.kept)} kept where the search began: {', '.join(rest) or 'nothing else is known'}."
+        yield f"With {', '.join(fit.kept)} kept at their initial values: {', '.join(rest) or 'nothing else is known'}."
     for i, e in enumerate(fit.estimates):
         yield from _about(e, i, fit, bool(found.active[i]), flat)
     yield from (_differ(one) for one in fit.agreement if not one.agrees)
     if fit.worse > 0.0:
         before, after = fit.before["rmse"][1], fit.after["rmse"][1]
-        yield f"On windows that were not fitted the rmse grew from {before:.4g} to {after:.4g}: worse than the start."
+        yield f"On held-out windows the rmse grew from {before:.4g} to {after:.4g}: worse than the start."
     if few := [e.name for e in fit.estimates if np.isfinite(e.std) and e.freedom < EFFECTIVE]:
-        yield f"The intervals of {', '.join(few)} rest on few independent data; more windows would narrow them."
+        yield f"The intervals of {', '.join(few)} are based on few independent data; more windows would narrow them."
     if off > tolerance:
         yield f"Derivatives differ from central differences by {off:.1e}: judge the intervals by it."
     if not found.success:
@@ -255,7 +264,7 @@ def _about(e: Estimate, i: int, fit: Fit, active: bool, flat: Mapping[int, str])
         size = f"{e.value:.4g} [{e.low:.4g}, {e.high:.4g}]"
         yield f"{e.name} cannot be distinguished from its bound {bound:g} {e.unit}: {size}."
     elif active:
-        yield f"{e.name} stands at a bound, {e.value:.4g} {e.unit}."
+        yield f"{e.name} is at a bound, {e.value:.4g} {e.unit}."
     elif np.isfinite(e.std) and not e.identifiable:
         yield f"{e.name} is not identifiable: {e.value:.4g} +- {e.high - e.value:.2g} {e.unit}."
     for j in range(i):
@@ -268,5 +277,5 @@ def _differ(one: Agreement) -> str:
     (a, b), (s, t) = one.values, one.stds
     return (
         f"{one.name} is not the same in both halves of the data: {a:.4g} +- {s:.2g} and {b:.4g} +- {t:.2g} "
-        "(standard deviations). The model lacks something that moves it, and no interval covers that."
+        "(standard deviations). The model lacks an effect that changes it, which no interval covers."
     )

@@ -155,7 +155,7 @@ def _descend(timed: _Timed, limits: tuple[Floats, Floats], scale: Any, kept: Seq
     if not np.any(part):
         return Found(
             x=x0, residual=problem.residual(x0), kept=tuple(kept), active=active,
-            evaluations=timed.evaluations, success=True, message="Nothing is left to search for.",
+            evaluations=timed.evaluations, success=True, message="There is nothing to search for.",
         )  # fmt: skip
     bounds = (limits[0][part], limits[1][part])
     try:

@@ -70,7 +70,7 @@ def unavailable(who: str, error: ModuleNotFoundError, *, ours: bool = True) -> F
         raise error
     brings = "crossbody[logs]" if ours else package
     return FormatUnavailable(
-        f"{who} needs the package {package!r}, which is not installed: pip install {brings!r} brings it."
+        f"{who} needs the package {package!r}, which is not installed; install it with: pip install {brings!r}"
     )
 
 
@@ -81,11 +81,11 @@ def recognise(path: Path) -> str:
     if len(found) == 1:
         return found[0]
     if found:
-        raise LogFormatError(path, f"could be {' or '.join(found)}; say which by `format` in the column map.")
+        raise LogFormatError(path, f"could be {' or '.join(found)}; set `format` in the column map.")
     if path.is_dir():
         raise LogFormatError(path, "is a folder; name a file, or the folder of a ROS 2 bag (with its metadata.yaml).")
     if promised := [name for name in names() if path.suffix.lower() in load(name).SUFFIXES]:
-        raise LogFormatError(path, f"does not begin as {' or '.join(promised)} files do: damaged, or not what it says.")
+        raise LogFormatError(path, f"does not begin as {' or '.join(promised)} files do: damaged, or a wrong name.")
     known = ", ".join(f"{name} ({' '.join(load(name).SUFFIXES)})" for name in names())
     raise LogFormatError(path, f"is in no known log format (it begins with {head[:8].hex(' ')}). Known: {known}.")
 

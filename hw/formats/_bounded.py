@@ -102,7 +102,9 @@ class MeteredFile(io.BufferedReader):
                 self._budget.spend(0)
             self._places[at] = self._places.get(at, 0) + 1
             if self._left < 0 or (left and self._places[at] > SAME):
-                raise LogFormatError(self._path, "has blocks that lead back to themselves: damaged, or made so.")
+                raise LogFormatError(
+                    self._path, ("has blocks that lead back to themselves: damaged, or built that way on purpose.")
+                )
         return found
 
 

@@ -28,7 +28,7 @@ def starts(path: Path) -> list[int]:
         order = _order(file.read(HEADER))
         while at + TAG <= end:
             if len(found) == MOST_COLUMNS:
-                text = f"holds more than {MOST_COLUMNS} variables; a log of so many is not read."
+                text = f"holds more than {MOST_COLUMNS} variables; such a log is not read."
                 raise LogFormatError(path, text)
             found.append(at)
             file.seek(at)

@@ -156,14 +156,16 @@ def rows_of(
     if row % BLOCK_MESSAGES:
         yield _arrays(path, kept, types, row)
     if group.rows is not None and row != group.rows:
-        raise LogFormatError(path, f"announces {group.rows} messages on {group.name!r} and holds {row}: cut off?", row)
+        raise LogFormatError(
+            path, f"announces {group.rows} messages on {group.name!r} and holds {row}: truncated?", row
+        )
 
 
 def _value(path: Path, row: int, message: Any, leaf: Leaf) -> Any:
     try:
         return _at(message, leaf)
     except (AttributeError, KeyError, IndexError, TypeError, ValueError):
-        raise LogFormatError(path, "the message lacks this number.", row, leaf.name) from None
+        raise LogFormatError(path, "this number is missing in the message.", row, leaf.name) from None
 
 
 def _arrays(path: Path, kept: dict[str, list[Any]], types: Mapping[str, str], row: int) -> Block:
@@ -174,5 +176,5 @@ def _arrays(path: Path, kept: dict[str, list[Any]], types: Mapping[str, str], ro
             block[name] = np.array(values, dtype=types[name] if whole else np.float64)
         except (TypeError, ValueError, OverflowError):
             first = next(i for i, v in enumerate(values) if not _number(v))
-            raise LogFormatError(path, "the message holds no number here.", row - len(values) + first, name) from None
+            raise LogFormatError(path, "the message has no number here.", row - len(values) + first, name) from None
     return block

@@ -107,5 +107,5 @@ def sliced(
                 block[name] = get(name, start, stop)
             if len(block[name]) != stop - start:
                 at = start + len(block[name])
-                raise LogFormatError(path, f"ends before its {group.rows} rows: cut off?", at, name)
+                raise LogFormatError(path, f"ends before its {group.rows} rows: truncated?", at, name)
         yield block

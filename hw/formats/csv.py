@@ -100,7 +100,7 @@ class CsvReader:
             twice = next(name for name in schema.names if schema.names.count(name) > 1)
             raise LogFormatError(path, "is the name of two columns; names must differ.", column=twice)
         if options.header and schema.names and all(map(_is_number, schema.names)):
-            raise LogFormatError(path, "has numbers where names are expected; say `options.header = false`.")
+            raise LogFormatError(path, "has numbers where names are expected; set `options.header = false`.")
         self._types = {f.name: _type(f, batch) for f in schema}
         units = dict(zip(schema.names, _units(path, options, self._delimiter), strict=False))
         columns = tuple(Column(name=n, type=t, unit=units.get(n) or header_unit(n)) for n, t in self._types.items())
@@ -225,7 +225,9 @@ def find_fault(
                     row += 1
                     continue
                 if len(line) >= LINE or "\0" in line:
-                    return LogFormatError(path, "the line is no text table (binary, or without an end).", row)
+                    return LogFormatError(
+                        path, ("the line is not part of a text table (binary, or without an end)."), row
+                    )
                 if line.strip():
                     cells = next(csv.reader([line], delimiter=delimiter))
                     names = names or [f"c{i}" for i in range(len(cells))]
@@ -241,7 +243,7 @@ def _check(
     path: Path, row: int, names: Sequence[str], cells: Sequence[str], columns: Sequence[str], decimal: str
 ) -> LogFormatError | None:
     if len(cells) != len(names):
-        return LogFormatError(path, f"the line has {len(cells)} cells, the header {len(names)}: cut off?", row)
+        return LogFormatError(path, f"the line has {len(cells)} cells, the header {len(names)}: truncated?", row)
     for name, cell in zip(names, cells, strict=True):
         if name in columns and not _is_numeric_cell(cell, decimal):
             kind = "a formula" if cell.lstrip().startswith(FORMULA) else "text"
@@ -254,8 +256,8 @@ def _check(
 def _hint(row: int, cell: str, decimal: str) -> str:
     """What the map could say about a cell that is no number as it stands."""
     if decimal == "." and COMMA.fullmatch(cell.strip()):
-        return ' With a decimal comma, say `options.decimal = ","`.'
-    return "" if row else " Below a header of two lines, say `options.units = true`, or `options.skip`."
+        return ' With a decimal comma, set `options.decimal = ","`.'
+    return "" if row else " With a header of two lines, set `options.units = true`, or `options.skip`."
 
 
 def _is_numeric_cell(cell: str, decimal: str) -> bool:

@@ -95,7 +95,7 @@ class HdfReader:
         if any(dtype.kind not in "fiub" for dtype in plain):
             return f"holds {str(item.dtype)[:LONGEST]}, not numbers"
         if item.shape is None or not layout(item.shape):
-            return f"has shape {item.shape}, which is no table"
+            return f"has shape {item.shape}, which is not a table"
         small = item.chunks and math.prod(item.chunks) * item.dtype.itemsize < TINY
         if small and _chunks(item) > MOST_CHUNKS:
             return f"is cut into more than {MOST_CHUNKS} chunks of less than {TINY} bytes: `h5repack` joins them"
@@ -169,9 +169,9 @@ def _missing(item: Any) -> str:
     if item.external or item.is_virtual:
         return "keeps its numbers in another file"
     if item.chunks and item.id.get_num_chunks() < _chunks(item):
-        return "is declared but not written in full: cut off?"
+        return "is declared but not written in full: truncated?"
     if not item.chunks and item.size and not item.id.get_storage_size():
-        return "is declared but never written: cut off?"
+        return "is declared but never written: truncated?"
     return ""
 
 

@@ -62,7 +62,7 @@ class MatReader:
 
     def _add(self, key: str, name: str, shape: Sequence[int], dtype: np.dtype[Any]) -> None:
         if (found := layout(shape)) is None:
-            self.refused[name] = f"has shape {tuple(shape)}, which is no table"
+            self.refused[name] = f"has shape {tuple(shape)}, which is not a table"
             return
         rows, width, axis = found
         self._tables.append(Table(key=key, name=name, type=dtype.name, rows=rows, width=width, axis=axis))

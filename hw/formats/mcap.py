@@ -100,7 +100,9 @@ class McapReader:
                 if told and first.keys() >= told.keys():
                     return told, first
         for topic in told.keys() - first.keys():
-            raise LogFormatError(self._path, f"announces {told[topic]} messages on {topic!r} and holds none: cut off?")
+            raise LogFormatError(
+                self._path, f"announces {told[topic]} messages on {topic!r} and holds none: truncated?"
+            )
         return counts, first
 
     def _told(self) -> dict[str, int]:
@@ -113,7 +115,7 @@ class McapReader:
         start = self._summary_start()
         for _, opcode, length in records(self._file, self._path, self._budget, start) if start else ():
             if opcode in (CHUNK, MESSAGE):
-                raise LogFormatError(self._path, "has messages in its summary, which no recorder writes there.")
+                raise LogFormatError(self._path, "has messages in its summary, where no recorder writes any.")
             if opcode == CHANNEL:
                 channel = Channel.read(ReadDataStream(BytesIO(self._file.read(length))))
                 topics[channel.id] = channel.topic
@@ -172,7 +174,7 @@ class McapReader:
         name = raw[CHUNKED.size : CHUNKED.size + min(length, LONGEST)].decode()
         (stored,) = struct.unpack_from("<Q", raw, begin - 8)
         if stored > len(raw) - begin:
-            raise ValueError("a chunk reaches beyond its record")
+            raise ValueError("a chunk extends beyond its record")
         whole = self._chunks.unfold(at, name, raw[begin : begin + stored], size)
         if checksum and zlib.crc32(whole) != checksum:
             raise LogFormatError(self._path, "has a chunk whose checksum is wrong: damaged.")
@@ -214,7 +216,7 @@ def records(file: Any, path: Path, budget: Budget, at: int = len(MAGIC)) -> Iter
         opcode, length = RECORD.unpack(file.read(RECORD.size))
         if opcode == 0 or length > end - at - RECORD.size:
             raise LogFormatError(
-                path, "has a record that is none, or reaches beyond its end: cut off? `mcap recover` helps."
+                path, "has an invalid record, or one that extends beyond its end: truncated? `mcap recover` helps."
             )
         if opcode == CHUNK and length >= SIZES.size:
             budget.hold(2 * SIZES.unpack(file.read(SIZES.size))[2], "a chunk and its messages")
@@ -234,6 +236,6 @@ def _inside(whole: memoryview, budget: Budget) -> Iterator[tuple[int, memoryview
         opcode, length = RECORD.unpack_from(whole, at)
         at += RECORD.size
         if opcode == 0 or length > len(whole) - at:
-            raise ValueError("a record is none, or reaches beyond its chunk")
+            raise ValueError("a record is invalid, or extends beyond its chunk")
         yield opcode, whole[at : at + length]
         at += length

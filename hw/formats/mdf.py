@@ -72,7 +72,7 @@ class MdfReader:
         if rows and width and stored < rows * width:
             raise LogFormatError(
                 self._path,
-                f"announces {rows} rows in group {index} and holds {stored // width}: cut off?",
+                f"announces {rows} rows in group {index} and holds {stored // width}: truncated?",
                 stored // width,
             )
 

@@ -87,7 +87,7 @@ def _check_database(path: Path, file: Path) -> None:
         for kind, name, text in link.execute("SELECT type, name, sql FROM sqlite_master").fetchall():
             shown = str(name)[:40]
             if kind not in KINDS or "VIRTUAL" in str(text).upper().split("(")[0]:
-                raise LogFormatError(path, f"has a {kind} {shown!r} that computes what it shows.")
+                raise LogFormatError(path, f"has a {kind} {shown!r} whose content is computed.")
             if kind == "table" and any(row[6] for row in link.execute("SELECT * FROM pragma_table_xinfo(?)", (name,))):
                 raise LogFormatError(path, f"has a table {shown!r} with columns that are computed.")
             if kind == "table" and name in FEW:

@@ -32,7 +32,7 @@ def links(name: str, title: str, values: Mapping[str, float], count: int, restar
     own = link_chain.names(count)
     table = {
         "gravity": Parameter(default=values["gravity"], unit="m/s^2", doc="down", low=0.0, high=100.0),
-        "slip": Parameter(default=0.01, unit="rad/s", doc="rate over which dry friction is smoothed", low=1e-6),
+        "slip": Parameter(default=0.01, unit="rad/s", doc="rate within which dry friction is smoothed", low=1e-6),
         **{key: _parameter(key, values.get(key, 0.0)) for key in own[2:]},
     }
     angles = tuple(Coordinate(name=f"th{i + 1}", unit="rad") for i in range(count))

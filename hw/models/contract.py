@@ -156,7 +156,7 @@ class Model:
         if given and lacking:
             raise SceneError(
                 f"The log has the input {given[0]}, and no {', '.join(lacking)}, which drives "
-                f"{self.name} too; a joint that nothing drives takes a column of zeros."
+                f"{self.name} too; an undriven joint needs a column of zeros."
             )
         wanted = {} if self.needs else {("coordinates", c.name): c.unit for c in self.measured}
         for (role, name), unit in (wanted | {("inputs", name): TORQUE for name in given}).items():

@@ -1,4 +1,4 @@
-"""A cube tossed on a table, with friction; the defaults are those of ContactNets (Pfrommer et al. 2020)."""
+"""A cube tossed onto a table, with friction; the defaults are those of ContactNets (Pfrommer et al. 2020)."""
 
 from __future__ import annotations
 

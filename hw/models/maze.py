@@ -1,4 +1,4 @@
-"""A ball in a tilted maze of rings: the angle of the maze and the place of the ball are measured."""
+"""A ball in a tilted maze of rings: the angle of the maze and the position of the ball are measured."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def load_columns(source: str | Path) -> Columns:
         reason = getattr(error, "strerror", None) or str(error)
         raise ColumnMapError(path, "$", f"cannot be read ({reason}); name a TOML file or one of: {known}.") from None
     if len(text) > LARGEST:
-        raise ColumnMapError(path, "$", "is larger than a megabyte: no column map.")
+        raise ColumnMapError(path, "$", "is larger than a megabyte, which no column map is.")
     return parse_columns(text, path)
 
 
@@ -158,7 +158,7 @@ def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns
         raise InvalidValue(f"text is {arguments.shown(text)}; it must be TOML, as text or bytes.")
     raw = text.encode("utf-8", "replace") if isinstance(text, str) else text
     if any(line.count(b".") > MOST_DOTS for line in raw.split(b"\n")):
-        raise ColumnMapError(path, "$", f"has a line of more than {MOST_DOTS} dots: no key is so deep.")
+        raise ColumnMapError(path, "$", f"has a line of more than {MOST_DOTS} dots, deeper than any key.")
     try:
         found = msgspec.toml.decode(text)
     except (msgspec.DecodeError, ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
@@ -219,7 +219,7 @@ def _check(columns: Columns, path: str | Path) -> None:
     _scale(columns.time.scale, "$.time.scale", path)
     if next(columns.signals(), None) is None:
         roles = ", ".join(role.value for role in Role)
-        raise ColumnMapError(path, "$", f"names no signal; there must be one in {roles}.")
+        raise ColumnMapError(path, "$", f"has no signal; there must be one in {roles}.")
     for role, name, signal in columns.signals():
         _check_signal(signal, f"$.{role.value}.{name}", path)
 

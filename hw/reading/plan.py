@@ -109,7 +109,7 @@ def make_plan(path: Path, reader: Reader, columns: Columns) -> Plan:
     sources = tuple(found.source(role, name, signal, group) for role, name, signal in columns.signals())
     _check_kinds(path, sources)
     if columns.part and found.column(columns.part)[0] is not group:
-        raise LogFormatError(path, "tells the parts but stands in other rows than the times.", column=columns.part)
+        raise LogFormatError(path, "identifies the parts, but has other rows than the times.", column=columns.part)
     return Plan(
         path=path, columns=columns, group=group, sources=sources, time_column=time.column,
         ticks=ticks, step=step, start=group.start if not time.column else 0.0,

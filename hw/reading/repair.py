@@ -72,7 +72,7 @@ def fill_dropped(
     if not missing.any():
         return block, (), np.zeros(0, np.int64)
     if missing.sum() > MOST * len(steps):
-        text = f"lacks {missing.sum()} samples beside {len(steps) + 1} that are there: no dropouts, but another rate."
+        text = f"lacks {missing.sum()} samples and has {len(steps) + 1}: these are not dropouts, but another rate."
         raise InvalidValue(f"fill_dropped: the log {text}")
     before = np.repeat(np.arange(len(steps)), missing)  # the row before each new one
     inside = np.arange(len(before)) - np.repeat(np.cumsum(missing) - missing, missing) + 1

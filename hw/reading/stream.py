@@ -64,7 +64,7 @@ def _exact(path: Path, time: Floats, other: Rows, column: str) -> tuple[Floats, 
     if len(time) != len(other.time) or not np.array_equal(time, other.time):
         n = min(len(time), len(other.time))
         row = int(np.argmax(np.append(time[:n] != other.time[:n], True)))
-        text = 'has other times than the log; say `join = "hold"` (commands) or "linear" (smooth signals).'
+        text = 'has other times than the log; set `join = "hold"` (commands) or "linear" (smooth signals).'
         raise LogFormatError(path, text, row, column)
     return other.values
 
@@ -143,7 +143,7 @@ class Stream:
         for _, block in self._blocks(self.plan.group, (), [column]):
             if block[column].dtype.kind not in "iuf" or not np.all(block[column] == np.rint(block[column])):
                 raise LogFormatError(
-                    self.plan.path, "does not hold whole numbers: it cannot tell runs apart.", column=column
+                    self.plan.path, "does not contain whole numbers, so it cannot separate runs.", column=column
                 )
             found.update(np.unique(block[column]).astype(int).tolist())
         return tuple(sorted(found))

@@ -56,7 +56,7 @@ def to_si(unit: str) -> Conversion:
         raise unavailable("Reading units", error) from None
     except Exception as error:  # pint raises its own, tokenizer's and arithmetic errors
         known = "rad, deg, rpm, m, mm, N, N m, s, ms, V, A, 1 for a pure number"
-        raise InvalidValue(f"{unit!r} is no unit; write for example {known}.") from error
+        raise InvalidValue(f"{unit!r} is not a unit; write for example {known}.") from error
 
 
 def is_time(unit: str) -> bool:

@@ -232,13 +232,17 @@ def conditions(t: Floats, B: Floats, rows: tuple[str, ...], names: tuple[str, ..
     r = int(rank[at])
     where = "everywhere" if len(bad) == len(t) else f"at {len(bad)} of {len(t)} instants, first at t = {t[at]:.6g} s"
     apart, idle = _named(Vt[at, r:], names), _named(U[at, :, r:].T, rows)
-    told = [f"they cannot tell {' from '.join(apart)} (only a combination of them shows)"] if len(apart) > 1 else []
+    told = (
+        [(f"they cannot distinguish {' from '.join(apart)} (only a combination has an effect)")]
+        if len(apart) > 1
+        else []
+    )
     told += [f"{apart[0]} does nothing"] if len(apart) == 1 else []
     told += [f"no input balances {', '.join(idle)}"] if idle else []
     raise SceneError(
         f"{model}: {m} inputs ({', '.join(names)}) and {k} measured coordinates "
         f"({', '.join(rows)}), rank {r} {where}, condition {condition[at]:.2g}: {'; '.join(told)}. "
-        "What is needed is one input for each coordinate, away from singular poses."
+        "One input is needed for each coordinate, away from singular poses."
     )
 
 

@@ -121,7 +121,7 @@ def _predict(
 
 def _looped(model: Model, numbers: Mapping[str, Value], window: Window, name: str) -> tuple[Trajectory, dict[str, Any]]:
     if name != "reference":
-        raise CaseUnsupported(f"{name} follows the paths of a case alone; a recorded reference is the reference's.")
+        raise CaseUnsupported(f"{name} follows only the paths of a case; only the reference follows a recorded one.")
     assert model.loop is not None  # checked by the caller
     if lacking := [r for r in model.references if r not in window.log.names("references")]:
         raise SceneError(f"The log has no reference {', '.join(lacking)}, which the controller follows.")

@@ -100,7 +100,7 @@ def unlagged(t: Floats, y: Floats, rate: float, noise: float, quantum: float = 0
         raise InvalidValue(f"rate is {rate!r} 1/s, noise {noise!r}, quantum {quantum!r}; valid: above 0, at least 0.")
     t, y = frozen("unlagged", "t", t, (None,)), frozen("unlagged", "y", y, (None, None))
     if len(t) != len(y) or len(t) < 2:
-        raise InvalidValue(f"{len(t)} times and {len(y)} readings: there must be as many of both, at least two.")
+        raise InvalidValue(f"{len(t)} times and {len(y)} readings: both must have the same number, at least two.")
     c = np.exp(-rate * np.diff(t))[:, None]
     force = (y[1:] - c * y[:-1]) / (1.0 - c)
     each = math.hypot(noise, quantum / math.sqrt(12.0))

@@ -46,7 +46,7 @@ def closed_by(H: NDArray[Any], others: NDArray[np.int64], right: NDArray[Any]) -
         free = [int(i) for i in others[np.abs(Vt[-1]) > 0.1 * np.max(np.abs(Vt[-1]))]]
         raise SceneError(
             f"A singular pose: the {len(block)} rows have rank {rank} in the coordinates that are not "
-            f"measured, and leave coordinates {free} free; the measured ones do not tell the pose there."
+            f"measured, and leave coordinates {free} free; the measured ones do not determine the pose there."
         ) from None
 
 

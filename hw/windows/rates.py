@@ -89,13 +89,12 @@ def rates_by_fit(t: Floats, y: Floats, rows: Rows | None = None) -> Floats:
     for width, degree in WIDTHS:
         if width > len(t):
             continue
-        limit = stats.chi2.isf(LEVEL, max(width - degree - 1, 1)) / max(width - degree - 1, 1)
         for place in _places(width):
             open_ = np.flatnonzero(left > 1.0)
             for part in np.array_split(open_, max(1, -(-len(open_) // (2 * CHUNK)))):
                 if not len(part):
                     continue
-                rate, off = _fitted(t, y, rows[part], width, degree, place, noise, float(limit))
+                rate, off = _fitted(t, y, rows[part], width, degree, place, noise)
                 better = off < left[part]
                 found[part[better]], left[part[better]] = rate[better], off[better]
     return found
@@ -108,14 +107,13 @@ def _places(width: int) -> Rows:
 
 
 def _fitted(
-    t: Floats, y: Floats, rows: Rows, width: int, degree: int, place: int, noise: Floats, limit: float
-) -> tuple[Floats, Floats]:
+    t: Floats, y: Floats, rows: Rows, width: int, degree: int, place: int, noise: Floats
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Rates (m, k) of polynomials, and how much more than noise they leave (m,): at most 1 if they fit."""
     at, span, powers, inverse, which = _polynomials(t, rows, place, width, degree)
     coefficients = np.einsum("nij,njk->nik", inverse[which], y[at])
     off = (y[at] - np.einsum("nji,nik->njk", powers[which], coefficients)) / noise
-    free = max(width - degree - 1, 1)
-    large = np.max(np.sum(off**2, axis=1) / free, axis=1) / limit
+    large = np.max(np.sum(off**2, axis=1), axis=1) / stats.chi2.isf(LEVEL, max(width - degree - 1, 1))
     return coefficients[:, 1] / span[:, None], np.maximum(large, np.max(np.abs(off), axis=(1, 2)) / WORST)
 
 

@@ -5,7 +5,7 @@ algebra       mass matrix by blocks and trees, Schur complement: their factors
 acceleration  v' and lam of the active rows
 dop853        explicit step of order 8 with dense output of order 7
 esdirk        L-stable implicit step of order 4 for what is stiff
-exact         closed-form arcs where the scene is affine
+exact         closed-form arcs if the scene is affine
 dense         the state anywhere inside the step just taken
 machine       the state machines: what is switched at an instant
 events        where inside a step a machine must switch

@@ -252,7 +252,7 @@ def settle(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
     Returns:
         0, EVENTS_FULL if the caller must make room and come again, or a negative code. After MODE_CYCLE the last line
-        of the history marks the rows that switch for ever.
+        of the history marks the rows that switch forever.
     """
     s.lenient, s.barred = np.inf if s.frictional else 1.0, 0
     if s.frozen or s.frictional or s.fsm == MEMORYLESS:

@@ -26,7 +26,7 @@ class Robot:
         jm: inertia of a rotor, kg m^2.
         g: gravity along +z, m/s^2.
         d1, d2, d3: viscous friction on the three angles of an arm, N m s.
-        sign: +1 or -1: arms 2 and 3 stand at -120 and +120 degrees times this.
+        sign: +1 or -1: arms 2 and 3 are at -120 and +120 degrees times this.
     """
 
     r_base: float = 0.125

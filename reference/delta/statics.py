@@ -76,5 +76,5 @@ def task_mass(robot: Robot, q: ArrayLike, *, exact: bool = True) -> Floats:
     given, My = vector("q", q, 9), np.zeros((3, 3))
     det = compiled.task_mass(robot.array(), given[MOTORS].copy(), given[OTHERS].copy(), exact, My)
     if not abs(det) > compiled.SINGULAR:
-        raise SceneError("The mass felt by the motors is undefined here: the control Jacobian is singular.")
+        raise SceneError("The mass seen by the motors is undefined here: the control Jacobian is singular.")
     return My

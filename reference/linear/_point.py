@@ -94,7 +94,7 @@ def check_frictionless(system: System) -> None:
     if system.frictional:
         raise SceneError(
             "The system has friction (System.mu, System.friction_loss). Derivatives at many states and "
-            "estimates of forces are there for systems without; valid: linearise, trim, sensitivity."
+            "estimates of forces exist only for systems without it; valid: linearise, trim, sensitivity."
         )
 
 
@@ -105,7 +105,9 @@ def check_held(system: System, *, driven: bool = False) -> None:
         SceneError: if a controller in Python gives its inputs, or some of them are activations.
     """
     if system.activations is not None and not driven:
-        raise SceneError("Actuators with an activation have a state beside q and v: only linearise knows it.")
+        raise SceneError(
+            "Actuators with an activation have a state in addition to q and v, which only linearise supports."
+        )
     if isinstance(system.control, Control):
         raise SceneError(
             f"System.control is the controller {system.control.label} in Python, which has no derivatives; "
@@ -124,8 +126,8 @@ def check_coordinates(system: System) -> None:
     if system.velocity is not None:
         raise SceneError(
             "System.velocity is given: q' is not v. Derivatives at many states and estimates "
-            "of forces are there for systems whose velocities are the derivatives of their "
-            "positions alone; valid: linearise, sensitivity."
+            "of forces exist only for systems whose velocities are the derivatives of their positions; valid: "
+            "linearise, sensitivity."
         )
 
 

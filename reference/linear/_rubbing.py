@@ -109,7 +109,7 @@ def check_idle(at: Point, H: Floats, vd: Floats, law: Floats, free: Floats) -> N
     if not off.max(initial=0.0) <= HELD * size.max(initial=0.0):
         raise SceneError(
             f"linearise: rows {at.idle.tolist()} follow from the other active ones at q = {at.q.tolist()}, "
-            "but their laws do not: no motion fulfils all of them; leave some contacts out."
+            "but their laws do not: no motion satisfies all of them; leave some contacts out."
         )
 
 

@@ -41,8 +41,8 @@ GRAZING = 1e-12  # part of the terms of g_x f below which an event is only graze
 
 
 AS_ONE = (
-    "sensitivity: several rows strike as one; a deviation parts them, and what follows then depends on which of them "
-    'comes first, so there is no derivative. Use collisions="sequential".'
+    "sensitivity: several rows collide simultaneously; a deviation separates them, and the motion then depends on "
+    'which comes first, so there is no derivative. Use collisions="sequential".'
 )
 SAME = 1e-3  # part of the motion's size by which its end may differ from the one that was passed through
 

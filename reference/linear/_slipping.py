@@ -44,20 +44,20 @@ GRAZED = 1e-8  # part of the largest slip, or of a bound, to which a contact may
 EDGE = 1e-6  # part of an arc at its start at which nothing is grazed yet
 ALIKE = 1e-6  # part of the shifts of two events by which they may differ and still be one
 AS_ONE = (
-    "sensitivity: several rows switch as one at t = {t:.9g} s; a deviation parts them, and "
-    "what follows then depends on which of them comes first, so there is no derivative."
+    "sensitivity: several rows switch simultaneously at t = {t:.9g} s; a deviation separates them, and "
+    "the motion then depends on which comes first, so there is no derivative."
 )
 TURNS_BACK = (
-    "sensitivity: the slip of row {i} turns back through zero at t = {t:.9g} s; beside this "
-    "motion it turns round in space instead, so that there is no derivative."
+    "sensitivity: the slip of row {i} turns back through zero at t = {t:.9g} s; in neighbouring "
+    "motions it turns round in space instead, so that there is no derivative."
 )
 TOO_SHORT = (
     "sensitivity: row {i} slides at t = {t:.9g} s for so short a time that the direction of "
     "its slip, and how it changes with the motion, is lost in rounding."
 )
 SHARED = (
-    "sensitivity: row {i} slides at t = {t:.9g} s out of a load that it shared, and the law "
-    "does not say how a deviation changes its share (indeterminate)."
+    "sensitivity: row {i} slides at t = {t:.9g} s while it shares a load, and the law does not determine "
+    "how a deviation changes its share (indeterminate)."
 )
 Place = Callable[[Point, float, Floats], Point]
 

@@ -81,7 +81,8 @@ def linearise(
         outputs = OUTPUTS[:3] if len(at.sharing) else OUTPUTS
     elif "lam" in outputs and len(at.sharing):
         raise SceneError(
-            f"linearise: rows {at.sharing.tolist()} share their load, and small motions do not say how it changes; "
+            f"linearise: rows {at.sharing.tolist()} share their load, and small motions do not determine how it "
+            "changes; "
             'valid: outputs without "lam".'
         )
     found = acts.widened(derivatives(at))

@@ -183,7 +183,7 @@ class LinearModel:
         if not leaving <= allowed:
             raise SceneError(
                 f"LinearModel.restricted: the motion leaves the subspace at a rate of {leaving:.3g} "
-                f"(allowed {allowed:.3g}); hold rows only where the mechanism stands still."
+                f"(allowed {allowed:.3g}); hold rows only where the mechanism is at rest."
             )
 
 

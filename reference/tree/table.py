@@ -183,7 +183,7 @@ class _Builder:
 
     def _node(self, joint: Joint, before: Place) -> None:
         if joint.type == "free" and any(joint.stiffness):
-            raise SceneError(f"Joint {joint.name!r}: springs of a free joint are not done.")
+            raise SceneError(f"Joint {joint.name!r}: springs of a free joint are not supported.")
         row, kind = np.zeros(layout.NODE), TYPES[joint.type]
         width_q, width_v = WIDTHS[joint.type]
         dof, index = len(self.dof_rows), len(self.rows)
@@ -299,7 +299,8 @@ class _Builder:
                 )
             if width > 1 and (actuator.gain[1] or actuator.bias[1]):
                 raise SceneError(
-                    f"Actuator {actuator.name!r}: its force depends on its length, which a {joint.type} joint has not."
+                    f"Actuator {actuator.name!r}: its force depends on its length, which a {joint.type} joint "
+                    "does not have."
                 )
             dof = self.dofs[joint.name]
             row[[layout.TARGET, layout.WHICH, layout.ANGLE]] = layout.ON_JOINT, dof, self.coordinates[joint.name]
@@ -451,7 +452,7 @@ def pair_rows(scene: Scene, builder: _Builder, first: int) -> list[Floats]:
     for i, contact in enumerate(contacts(scene)):
         one, two = (_shape(shape, builder.places) for shape in (contact.first, contact.second))
         if one[pairs.NODE] == two[pairs.NODE]:
-            raise SceneError(f"Pair {contact.pair.name!r}: its shapes do not move against each other.")
+            raise SceneError(f"Pair {contact.pair.name!r}: its shapes do not move relative to each other.")
         lies = phase = -1.0
         if contact.parallel > 0.0:
             lies, builder.sides = builder.sides, builder.sides + 1

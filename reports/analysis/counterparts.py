@@ -36,7 +36,8 @@ SLOW = 1e-3
 
 NO_FRICTION = {
     "verdict": Word.SKIPPED.value,
-    "why": "Friction is compared by motions: what its law makes of a slip near zero is no derivative of Coulomb's.",
+    "why": ("Friction is compared by motions: its law near zero slip has no derivative that could be compared "
+        "with Coulomb's."),
 }  # fmt: skip
 
 

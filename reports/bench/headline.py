@@ -65,7 +65,7 @@ def _failed(finest: pd.Series[Any]) -> str:
     """Why an engine reaches no error, by its finest run."""
     at = f"at {finest['knob']} = {finest['setting']:g}" if finest["knob"] else "as it is"
     if finest["touches"] and math.isfinite(finest["touches"]):
-        return f"reaches no error: {at} it touches {finest['touches']:+g} times beside the truth"
+        return f"reaches no error: {at} its touches differ from the truth's by {finest['touches']:+g}"
     return f"reaches no error: {at} its run ends {finest['outcome']}"
 
 

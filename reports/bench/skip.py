@@ -56,7 +56,7 @@ def _seconds(runs: Mapping[str, Any], repeats: int) -> dict[str, float]:
 def _rings(repeats: int) -> Iterator[Row]:
     runs = {str(n): _run(cases.load("ball_maze", "solve", rings=n)) for n in (5, 50)}
     took = _seconds(runs, repeats)
-    how = "rings that the ball cannot reach are bounded away"
+    how = "rings that the ball cannot reach are excluded by bounds"
     yield ratio("50 rings over 5", took["50"] / took["5"], 1.2, _beside(took, 1e3, "ms"), how)
 
 
@@ -71,7 +71,7 @@ def _idle_balls(repeats: int) -> Iterator[Row]:
     yield ratio(
         "a collision among 200 balls over one among 5", took["200"] / took["5"], 3.0,
         _beside(took, 1e6, "us a collision"),
-        "guards of far neighbours are bounded away; a chain of rows is banded; masses are diagonal",
+        "guards of far neighbours are excluded by bounds; a chain of rows is banded; masses are diagonal",
     )  # fmt: skip
 
 
@@ -101,7 +101,7 @@ def _counted(_repeats: int) -> Iterator[Row]:
     for what, count, limit, beside, how in (
         ("guard evaluations of a scene without rows", bare["guards"], 0.0, f"{bare['steps']} steps",
          "no contacts, no guards"),
-        ("guard evaluations beside the gaps of each step, where no row opens", past, 0.0, f"{closed['steps']} steps",
+        ("guard evaluations besides the gaps of each step, where no row opens", past, 0.0, f"{closed['steps']} steps",
          "no contact, no guard"),
         ("right-hand sides of 5 s in free flight", flown["rhs"], 20.0, in_form[0], "free flight in closed form"),
         ("right-hand sides of a ball on a linear floor", bounced["rhs"], None, in_form[1],

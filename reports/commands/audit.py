@@ -79,19 +79,19 @@ def _check_out(ask: Ask) -> None:
     for option, out, mark in ((option, out, mark) for option, out, mark in options if out is not None):
         here = f"{option} {shown(str(out))}"
         if out.resolve() in read:
-            raise OutputError(f"{here}: it must be another file than {ask.path}, what it reads and what is written.")
+            raise OutputError(f"{here}: it must differ from {ask.path}, the files that it reads and the other outputs.")
         if not out.parent.is_dir():
             raise OutputError(f"{here} cannot be written: there is no folder {shown(str(out.parent))}.")
         if out.exists() and not ask.force and not (out.is_file() and mark in out.read_text("utf-8", "replace")):
             raise OutputError(f"{here}: there is such a file, which was not written by {option}; valid: another name, "
-                              "or --force, which writes over it.")  # fmt: skip
+                              "or --force, which overwrites it.")  # fmt: skip
         read.add(out.resolve())
 
 
 def _fix(ask: Ask, out: Path) -> int:
     """Write the file in plainer words, and audit that: its exit code."""
     fixed(ask.path, out, ask.without)
-    voice.note(f"{out} means the same as {ask.path}; this is how it is read:")
+    voice.note(f"{out} is equivalent to {ask.path}; this is how it is read:")
     return audit(replace(ask, path=out, fix=None, sarif=None, markdown=None))
 
 
@@ -107,7 +107,7 @@ def read_by_all(ask: Ask) -> tuple[Audit, list[Row]]:
         raise EngineUnavailable(importers.missing(wanted))
     if all(row.quantity == "reading" and row.verdict == UNSUPPORTED for row in rows):
         why = " ".join(told.sentence(row) for row in rows)
-        raise EngineUnavailable(f"No reader that was asked, and is there, reads {ask.path}. {why}")
+        raise EngineUnavailable(f"No selected and installed reader reads {ask.path}. {why}")
     rows.sort(key=lambda row: (wanted.index(row.engine), QUANTITIES.index(row.quantity)))
     return found, rows
 

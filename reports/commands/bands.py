@@ -22,8 +22,8 @@ NEAR = (0.7, 1.4)
 off is chance, and moves tenfold with the last digit; the largest of three does not."""
 
 
-def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviations, float]]:
-    """What all installed engines give on one variant, the largest near their tolerances, and up to when."""
+def _measured(name: str, variant: str) -> list[stored.Laid]:
+    """What all installed engines give on one variant, the largest near their tolerances."""
     (case,) = choice.load_cases([name], variant, {})
     wanted = choice.picks(engines.names())
     result = jobs.run_case(case, wanted, tell=print, refine=False)
@@ -40,7 +40,7 @@ def _measured(name: str, variant: str) -> list[tuple[Case, Entry, stored.Deviati
                 key = (one.engine, one.profile)
                 found[key] = _largest(found[key], measured(case, one, result.truth), _known(case, one))
     end = shortened(result.truth).trusted
-    return [(case, one, found[one.engine, one.profile], end) for one in runs]
+    return [stored.laid(case, one, found[one.engine, one.profile], end) for one in runs]
 
 
 def _known(case: Case, entry: Entry) -> frozenset[str]:

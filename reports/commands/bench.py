@@ -56,7 +56,7 @@ def run(
         rows, orders = measure.joined([_part(path) for path in done])
         if not len(rows):
             absent = " ".join(pick.skipped for pick in picks if pick.skipped)
-            raise InvalidValue(f"No engine asked for can run a case asked for. {absent}".strip())
+            raise InvalidValue(f"None of the selected engines can run any of the selected cases. {absent}".strip())
         tables = {"bench": rows, "orders": orders, "headline": headline(rows)}
         losses = {} if base is None else {"lost": bench_against.lost(rows, tables["headline"], *base)}
         publish(out, "bench", tables | losses, provenance(command, repeats=effort.repeats))
@@ -118,7 +118,7 @@ def table(name: str, rows: pd.DataFrame, out: Path, command: str, failed: Sequen
 def alone(what: str, repeats: int | None, out: Path, command: str, limit: float = LIMIT, **asked: object) -> int:
     """The table of what is skipped, or of the throughput of many runs; the exit code."""
     if any(asked.values()):
-        raise InvalidValue(f"--{what} has scenes of its own; valid beside it: --out and --repeats.")
+        raise InvalidValue(f"--{what} has its own scenes; only --out and --repeats can be combined with it.")
     output.check(out, what)
     rows = (skip if what == "skip" else throughput).measure(repeats or 5)
     beyond = rows[~rows["held"].astype(bool)]

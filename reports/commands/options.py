@@ -122,9 +122,7 @@ def parameters(command: _Work) -> _Work:
     ) -> int:
         named = {name: asked.pop(name) for name in ("t_end", "ctrl", "control", "tick", "without")}
         if named["tick"] is not None and named["control"] is None and not any(p.startswith("control=") for p in pairs):
-            raise click.UsageError(
-                "--tick is the time between two calls of a controller, and none is given: --control."
-            )
+            raise click.UsageError("--tick is the time between calls of a controller, but no --control is given.")
         named |= {"push": "; ".join(" ".join(map(str, one)) for one in push) or None, "rank": asked.pop("rank")}
         own = [f"{name}={value}" for name, value in named.items() if value is not None]
         return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **asked)
@@ -133,8 +131,8 @@ def parameters(command: _Work) -> _Work:
     found: _Work = together(
         taking,
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
-        click.option("--t-end", type=float, metavar="S", help="Horizon, s; as --set t_end=S."),
-        click.option("--law", metavar="a0=,a1=", help="Constants of all rows; as --set for each constant."),
+        click.option("--t-end", type=float, metavar="S", help="Horizon, s; same as --set t_end=S."),
+        click.option("--law", metavar="a0=,a1=", help="Constants of all rows; same as --set for each constant."),
         click.option("--ctrl", metavar="FILE", help="Robot file: table of controls (CSV, Parquet, NPZ)."),
         click.option(
             "--control", metavar="FILE.py:NAME",

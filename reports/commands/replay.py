@@ -139,7 +139,7 @@ def run_identify(
     label = f"{ask.model} identified from {ask.path}"
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label}: {why}")
-    watch.resumable("Nothing was replaced; the same command begins anew.")
+    watch.resumable("Nothing was replaced; the same command starts from the beginning.")
     watch.limited(label, GRACE * (1.0 + limit))
     fit = hw.identify(
         log, model, free, parameters=given, restart=ask.restart, horizon=ask.horizon,

@@ -119,7 +119,9 @@ def _lost(run: EngineRun, row: Row) -> str:
     if math.isnan(row["band"]):
         return f"worse than the stored run: {run.label} {row['metric']}. {row['why']}"
     expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
-    value = f"{abs(row['value'] - expected):.4g}{unit_text(row['unit'])} from what is claimed, band {row['band']:.3g}"
+    value = (
+        f"{abs(row['value'] - expected):.4g}{unit_text(row['unit'])} from the claimed number, band {row['band']:.3g}"
+    )
     return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"
 
 

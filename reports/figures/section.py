@@ -74,12 +74,14 @@ class Plot:
         figure: every axis with its unit; its title becomes the caption.
         time: whether x is the time of a case's runs: then it shares cursor, zoom and clock with the others.
         folded: what it shows, if it is closed at first and drawn when it is opened.
+        choice: of what it is drawn, if its section shows the figures of one of several at a time.
     """
 
     name: str
     figure: Figure | Written
     time: bool = False
     folded: str = ""
+    choice: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +104,14 @@ class Section:
     tables: Sequence[Table] = ()
     template: str = "section.html"
     context: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def choices(self) -> dict[str, list[Plot]]:
+        """Plots by their choice, in order; one group if there is nothing to choose."""
+        found: dict[str, list[Plot]] = {}
+        for plot in self.plots:
+            found.setdefault(plot.choice, []).append(plot)
+        return found
 
 
 def columns(**titles: str | tuple[str, Kind]) -> tuple[Column, ...]:

@@ -21,7 +21,7 @@ from crossbody.reports.importers.conformance import judged_all
 from crossbody.reports.importers.fix import fixed
 from crossbody.reports.importers.forms import Forms, Node, Place, names, removed, with_lines
 
-TELLS = "The engine reads it as something else; say it in the engine."
+TELLS = "The engine reads it differently; set it in the engine."
 PLAIN = ("arm", "shapes that may touch", "URDF: arm", "URDF: link without mass", "URDF: inertia of the root")
 """What every robot has: without it nothing would be left to differ."""
 AND, PAIRED = " together with ", 5

@@ -115,7 +115,7 @@ def loops(found: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[Gap] | No
             told.append(Gap(same[i], f"what {named} holds" if same[i] else named, part=of[0] if of else ""))
         elif blind:
             left.remove(blind.pop())
-            told.append(Gap(1.0, "The engine tells the number of its loops alone.", unseen=True))
+            told.append(Gap(1.0, "The engine shows only the number of its loops.", unseen=True))
         else:
             told.append(Gap(1.0, f"{named} is missing", *counts, part=of[0] if of else ""))
     return [*told, *(Gap(1.0, f"{mine[i][0] or 'one'} is more", *counts, lacks=False) for i in left)]

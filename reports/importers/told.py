@@ -35,7 +35,8 @@ NAMED = 3  # quantities that are named of an engine in the first sentence
 
 WAYS = {
     "": ("reads the robot that the file describes", "read the robot that the file describes"),
-    "partly": ("reads it but for what it lacks or does not show", "read it but for what they lack or do not show"),
+    "partly": (("reads it, except for features that it lacks or does "
+        "not show"), "read it, except for features that they lack or do not show"),
     "another": ("reads another robot", "read another robot"), "failed": ("fails on it", "fail on it"),
     "unread": ("does not read such a file", "do not read such a file"),
 }  # fmt: skip

@@ -111,7 +111,7 @@ def _row(
 ) -> AuditRow:
     """One row; what is not shown is excused by the engine's contract or infinitely far off."""
     if key not in mine:
-        shown, value = ("not shown", np.nan) if key in hidden else ("not shown, and not excused", np.inf)
+        shown, value = ("not shown", np.nan) if key in hidden else ("not shown, without an accepted reason", np.inf)
     tolerance = LAM_TOLERANCE if key == "lam" else TOLERANCE
     return AuditRow(quantity=key, mine=shown, theirs=theirs, difference=value, tolerance=tolerance)
 

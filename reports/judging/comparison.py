@@ -214,7 +214,9 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     told = [] if known is None else [f"Known up to {until:.4g} s: {known.why}."]
     told.append(f"{truth.source}.")
     if many := truth.trajectory.counts.get("not_searched", 0):
-        told.append(f"At {many} instant{'s' * (many > 1)} too many contacts could change to look for a second motion.")
+        told.append(
+            f"At {many} instant{'s' * (many > 1)} too many contacts could change to search for a second motion."
+        )
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
     if truth.part < 1.0:
@@ -241,7 +243,7 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
             yield Verdict(
                 case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=claim.metric,
                 value=math.nan, expected=claim.expected, unit="", tier=claim.tier.value,
-                verdict=Word.OUTSIDE, command=command, why=f"The claim judged no run: {claim.source}.",
+                verdict=Word.OUTSIDE, command=command, why=f"No run was judged by the claim: {claim.source}.",
             )  # fmt: skip
 
 
@@ -286,9 +288,9 @@ class _Judge:
         times, why = longer * looser, found.why
         if metric in GROWING:
             times *= grows * longer  # what an error makes of the speed goes on
-            why += f"; the motion makes errors {grows:.2g} times as large as free flight does" if grows > 1.0 else ""
+            why += f"; errors grow {grows:.2g} times as much as in free flight" if grows > 1.0 else ""
         why += f"; the horizon is {longer:.3g} times the case's own" if longer > 1.0 else ""
-        why += f"; {self.looser:.3g} times that tolerance was asked for" if looser > 1.0 else ""
+        why += f"; {self.looser:.3g} times that tolerance was requested" if looser > 1.0 else ""
         claim = self.claims.get(metric)
         widest = WIDEST * (abs(claim.expected) if claim is not None and claim.expected else 1.0)
         return replace(found, value=max(found.value, min(found.value * times, widest)), why=why)
@@ -303,10 +305,10 @@ class _Judge:
         """What is said of a number: one outside is not judged where a tolerance was asked for that hides any fault."""
         stands = metric in EXACT or metric == "law_residual"
         if word is Word.OUTSIDE and metric == "rate_residual" and self.looser > 1.0:
-            return Word.INFO, "Its samples lie as far apart as the tolerance that was asked for lets its steps be."
+            return Word.INFO, "At the requested tolerance its samples are too far apart."
         if word is not Word.OUTSIDE or stands or not self.hides():
             return word, why
-        return Word.INFO, "The tolerance that was asked for allows errors as large as that of a fault."
+        return Word.INFO, "The requested tolerance allows errors as large as those of a fault."
 
     def row(self, metric: str, value: float, unit: str, verdict: Word, why: str, **more: Any) -> Verdict:
         return Verdict(
@@ -328,7 +330,7 @@ class _Judge:
         known = self.case.chaos or self.truth.horizon
         until = 1.0 if known is None else min(1.0, known.until / self.case.t_end)
         if compared < FLOOR * until and (word is Word.WITHIN or (word is Word.EXPECTED and stored is None)):
-            word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon alone: {against.source}"
+            word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon only: {against.source}"
         most = band(stored, limit, claim)
         kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST
         return self.row(
@@ -408,7 +410,7 @@ def _outcome(judge_: _Judge, run: Trajectory) -> Verdict:
     elif abs(end - t_end) <= REACHED * t_end:
         return judge_.row("finished", 1.0, "1", Word.WITHIN, "", expected=1.0, limit=0.0)
     else:
-        why = f"It says that it finished, but its record ends at t = {end:.9g} s instead of {t_end:.9g} s."
+        why = f"It reports that it finished, but its record ends at t = {end:.9g} s instead of {t_end:.9g} s."
     return judge_.row("finished", 0.0, "1", Word.OUTSIDE, why, expected=1.0, limit=0.0)
 
 
@@ -417,7 +419,9 @@ def _defaults(judge_: _Judge) -> Iterator[Verdict]:
     was, now = defaults(judge_.case, judge_.entry), words(judge_.entry.settings)
     if judge_.entry.default and was and was != now:
         changed = ", ".join(sorted(set(was.split()) ^ set(now.split())))
-        why = f"Its own settings are not those of the stored run ({changed}); if they should be, make bands stores it."
+        why = (
+            f"Its own settings are not those of the stored run ({changed}); if the change is intended, run make bands."
+        )
         yield judge_.row("settings", math.nan, "", Word.OUTSIDE, why, tier="")
 
 
@@ -556,7 +560,7 @@ def _part(judge_: _Judge, name: str, part: str, found: Split, unit: str) -> Iter
         yield judge_.row(row, math.nan, unit, Word.INFO, f"Not measured. {found.missing[part]}")
     if part not in found.there:
         return
-    why = f"Of the error of {found.where}. {found.says if part != 'importer' else ''}".strip()
+    why = f"Part of the error of {found.where}. {found.says if part != 'importer' else ''}".strip()
     known = found.known[part]
     yield judge_.row(row, found.there[part], unit, Word.INFO, why, known=known)
     against = judge_.truth if part != "step" or judge_.entry.own is None else judge_.entry.own

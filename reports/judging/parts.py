@@ -161,11 +161,11 @@ def _step(
     except NotMeasuredError as why:
         if math.isnan(rest := remaining(errors)):
             raise
-        falling = f"but each is at least {LEAST_RATIO:.2f} times the next: if they go on so, they sum to {rest:.1e}."
+        falling = f"but each is at least {LEAST_RATIO:.2f} times the next: if this continues, they sum to {rest:.1e}."
         return here - errors[-1], rest, f"{str(why).removesuffix('.')}; {falling}"
     limit, known = extrapolated(errors[-3:], ratio)
     if math.isinf(ratio):
-        return here - limit, known, f"Runs at steps of {_listed(study.sizes)} s differ by rounding."
+        return here - limit, known, f"Runs at steps of {_listed(study.sizes)} s differ only by rounding."
     order = f"Order {math.log(ratio) / math.log(RATIO):.2f}, observed between steps of {_listed(seen)} s"
     return here - limit, known, f"{order}; the limit is known to {known:.1e}."
 

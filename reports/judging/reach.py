@@ -30,7 +30,7 @@ choose its method; by how much more are tried next; and how much more than may b
 a run counts as too dear."""
 SHORT = {
     Outcome.TIME_LIMIT: "more takes longer than --budget allows",
-    Outcome.PAINLEVE: "rigid bodies with dry friction have no motion beyond (Painleve)",
+    Outcome.PAINLEVE: "rigid bodies with dry friction have no motion beyond this instant (Painleve)",
 }
 """Ends of the tightest run up to which a motion is compared all the same, and why not further."""
 BEFORE = 1e-6  # part of the time that such a run got to by which its horizon is shorter at least

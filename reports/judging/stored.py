@@ -23,6 +23,8 @@ FILE = Path(__file__).with_name("stored.json")
 SAME_END = 0.01
 """Part of the horizon by which a comparison may end elsewhere than the stored one and still be the same."""
 Deviations = Mapping[str, float]
+Laid = tuple[str, dict[str, Any], str, dict[str, Any]]
+"""What is stored of a run: label of its case, what its runs share, its engine, and its settings and numbers."""
 
 
 def words(settings: Mapping[str, Any]) -> str:
@@ -88,29 +90,37 @@ def _digest(case: Case) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def write(measured: Iterable[tuple[Case, Entry, Deviations, float]]) -> None:
+def laid(case: Case, entry: Entry, found: Deviations, trusted: float) -> Laid:
+    """Return what is stored of a run, as plain numbers that a process can send to another.
+
+    Args:
+        case: what ran.
+        entry: its run.
+        found: metric -> deviation.
+        trusted: up to when it was compared, s.
+    """
+    head = {"parameters": _digest(case)} | ({"compared": float(f"{trusted:.3g}")} if trusted < case.t_end else {})
+    numbers = {
+        metric: float(f"{value:.3g}") if math.isfinite(value) else str(value)  # JSON has no number for it
+        for metric, value in sorted(found.items())
+    }
+    run = {"settings": words(entry.settings), "deviations": numbers}
+    return case.label, head, f"{entry.engine}:{entry.profile}", run
+
+
+def write(runs: Iterable[Laid]) -> None:
     """Put runs in the place of those that are stored of the same cases and engines; others stay.
 
     So do runs with the same parameters, compared as far, of engines that are not installed here.
-
-    Args:
-        measured: of each run its case, its entry, metric -> deviation, and up to when it was compared, s.
     """
     table = dict(_table())
     fresh: dict[str, Any] = {}
-    for case, entry, found, trusted in measured:
-        if case.label not in fresh:
-            old, end = table.get(case.label, {}), float(f"{trusted:.3g}")
-            head = {"parameters": _digest(case)} | ({"compared": end} if trusted < case.t_end else {})
+    for label, head, who, run in runs:
+        if label not in fresh:
+            old = table.get(label, {})
             kept = dict(old["runs"]) if {k: v for k, v in old.items() if k != "runs"} == head else {}
-            fresh[case.label] = head | {"runs": kept}
-        fresh[case.label]["runs"][f"{entry.engine}:{entry.profile}"] = {
-            "settings": words(entry.settings),
-            "deviations": {
-                metric: float(f"{value:.3g}") if math.isfinite(value) else str(value)  # JSON has no number for it
-                for metric, value in sorted(found.items())
-            },
-        }
+            fresh[label] = head | {"runs": kept}
+        fresh[label]["runs"][who] = run
     lines = [f"{json.dumps(label)}: {_block(runs)}" for label, runs in sorted((table | fresh).items())]
     FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
     _table.cache_clear()

@@ -102,7 +102,10 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         text += f" Beyond a limit for a known cause, and not judged: {_named([_off(*one) for one in loose])}."
     short = [(run.label, row) for run in runs for row in run.rows if row["metric"] == TRUTH and row["compared"] < 1.0]
     if short:
-        text += f" Compared as far as the truth is known: {_named([f'{at}, {_part(row)}' for at, row in short])}."
+        text += (
+            " Compared up to the time to which the truth is known: "
+            f"{_named([f'{at}, {_part(row)}' for at, row in short])}."
+        )
     return text
 
 

@@ -73,7 +73,7 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
     first = exact(np.zeros(1))
     truth = Truth(
         tier=Tier.A,
-        source="closed form of every arc, which shares the numbers of the case alone with what it judges",
+        source="closed form of every arc, which shares only the numbers of the case with the runs that it judges",
         trajectory=exact(sample_times(first, case.t_end)),
         at=exact,
         agreement={},
@@ -121,10 +121,10 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
     tier = Tier.D if other == "compiled" else Tier.C
     rubs = tier is Tier.C and case.scene is not None and frictional(case.scene) is not None
     who, loose = other, SECOND * case.tight
-    shared = "equations, integrator and event location" if tier is Tier.D else "the equations of the mechanism alone"
+    shared = "equations, integrator and event location" if tier is Tier.D else "only the equations of the mechanism"
     second = _witness(case, OF_WITNESS * budget) if case.general and tier is Tier.C and not rubs else None
     if isinstance(second, Trajectory):
-        who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "the scene alone"
+        who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "only the scene"
     else:
         why = f" ({second})" if second else why
         limit = OF_WITNESS * budget if case.general and tier is Tier.C else math.inf
@@ -146,7 +146,7 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
     source = f"compiled reference at rtol {case.tight:g}, {who} at {loose:g} agrees: {said}; they share {shared}{why}"
     if truth.parted < case.t_end:
-        apart = f"they part at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
+        apart = f"they diverge at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
         ended = f"{who} ends {second.outcome.value} at t = {truth.parted:.4g} s"
         source += f"; {ended if math.isnan(truth.growth) else apart}"
     return _rechecked(replace(truth, source=source), case)
@@ -161,7 +161,7 @@ def _in_time(case: Case, solver: str, rtol: float, limit: float) -> Trajectory |
         bound = {"time_limit": part * limit} if math.isfinite(limit) else {}
         run = load("reference").prepare(shorter, solver, rtol=rtol, **bound).run()
         if run.outcome is Outcome.TIME_LIMIT:
-            return f"CVODE would share the equations alone, and take more than {limit:.0f} s"
+            return f"CVODE would share only the equations, but take more than {limit:.0f} s"
     return run
 
 
@@ -178,7 +178,7 @@ def _witness(case: Case, limit: float) -> Trajectory | str:
         first, rtol = replace(case, t_end=SHARE * case.t_end), WITNESS * case.tight
         cost, steps = estimated(partial(pinocchio.prepare, first, "law", rtol=rtol), SHARE, limit)
         if cost > limit:
-            return f"Pinocchio would share the scene alone, and take about {cost:.0f} s or more"
+            return f"Pinocchio would share only the scene, but take about {cost:.0f} s or more"
         # Contacts later on may want far more steps than the first part.
         most = max(1000, int(limit * steps / (SHARE * cost)))
         run = pinocchio.prepare(case, "law", rtol=rtol, max_steps=most).run()
@@ -214,12 +214,12 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
     if not case.general or case.chaos is not None:
         return None
     reasons = [
-        (truth.trajectory.determined_until, "the law does not say how hard contacts that slide press"),
-        (truth.trajectory.unique_until, "more than one set of sticking, sliding and open contacts keeps the law"),
-        (_arbitrary(truth, second, case), "the law does not say which of rows that depend on each other lets go first"),
+        (truth.trajectory.determined_until, "the law does not determine the normal forces of sliding contacts"),
+        (truth.trajectory.unique_until, "more than one set of sticking, sliding and open contacts satisfies the law"),
+        (_arbitrary(truth, second, case), "the law does not determine which of several dependent rows opens first"),
     ]
     if truth.parted < case.t_end and grown[-1] > MULTIPLIED:
-        why = f"until then neighbouring motions part by {MULTIPLIED:g} times what they started with"
+        why = f"until then the distance of neighbouring motions grows by {MULTIPLIED:g} times"
         reasons.append((float(t[np.argmax(grown > MULTIPLIED) - 1]), why))
     until, why = min(reasons)
     return Chaos(until=until, why=why) if 0.0 < until < min(case.t_end, truth.parted) else None

@@ -53,7 +53,7 @@ def _traces(group: pd.DataFrame, column: str, name: str, style: int, legend: boo
     return found
 
 
-ENDS = (("arrived", "in the centre", "circle", COLOURS[2]), ("lost", "not there at the end", "x", COLOURS[3]))
+ENDS = (("arrived", "in the centre", "circle", COLOURS[2]), ("lost", "not in the centre at the end", "x", COLOURS[3]))
 LINE, LABEL = 17, 48  # height of one scene, pixels, and the characters of its label, which leave the plot its room
 
 

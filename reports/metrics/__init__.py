@@ -104,7 +104,7 @@ def of(case: Case) -> Mapping[str, Metric]:
     from crossbody.reports.metrics._of_case import OfCase
 
     if twice := sorted(set(names()) & set(case.metrics)):
-        raise InvalidValue(f"{case.label}: metrics {', '.join(twice)} have the names of metrics that every case has.")
+        raise InvalidValue(f"{case.label}: metrics {', '.join(twice)} have the same names as metrics of all cases.")
     every: dict[str, Metric] = {name: load(name) for name in names()}
     every |= {name: OfCase(own) for name, own in case.metrics.items()}
     return {name: every[name] for name in sorted(every)}

@@ -36,7 +36,7 @@ SHALLOW = 1e-12
 
 
 def constraint_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Largest gap of the rows that are always on: zero where a closure holds.
+    """Largest gap of the rows that are always active: zero if a closure holds.
 
     Max |h| over all bilateral rows and samples, m; None without such a row. Where a case starts off the
     manifold this is its start; its decay is what the law prescribes.
@@ -135,7 +135,7 @@ def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def mode_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Instants of hand-over and of freedom against the truth's, contacts matched in order.
+    """Instants of hand-over and release against the truth's, contacts matched in order.
 
     Max |t - t_truth| over all that matched contacts have in both, s; None where there is none. A hand-over
     is from COLLISION to CONTACT; a row is free at its release or, let go below the surface, where it comes
@@ -192,7 +192,7 @@ def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None
 
 
 def release_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Contacts that ended in the run less those of the truth: 0 if both let go equally often.
+    """Contacts that ended in the run minus those of the truth: 0 if both release equally often.
 
     Number of contacts of the run that ended minus the truth's; None without a row that can open.
     """
@@ -214,7 +214,7 @@ def restitution_error(truth: Truth, run: Trajectory, case: Case) -> float | None
 
 
 def slip_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Instants at which shapes that held begin to slide, against the truth's.
+    """Instants at which sticking shapes begin to slide, against the truth's.
 
     Max |t - t_truth|, s, or less where friction comes near its bound slowly (`measuring.instants`); None where the
     truth has none, or the run has not the same pairs in the same order.
@@ -223,7 +223,7 @@ def slip_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def stick_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Instants at which shapes that slid hold, against the truth's.
+    """Instants at which sliding shapes begin to stick, against the truth's.
 
     Max |t - t_truth|, s, or less where the slip comes near zero slowly (`measuring.instants`); None where the
     truth has none, or the run has not the same pairs in the same order.
@@ -241,7 +241,7 @@ def _turned(truth: Truth, run: Trajectory, case: Case, slides: bool) -> float | 
 
 
 def touch_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Contacts of the run less those of the truth: 0 if both touch equally often.
+    """Contacts of the run minus those of the truth: 0 if both touch equally often.
 
     Number of contacts of the run minus the truth's.
     """

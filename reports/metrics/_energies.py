@@ -37,7 +37,7 @@ def contact_work(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def energy_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Energy against the truth's on matched arcs, over the largest kinetic energy or the swing of the potential.
+    """Energy against the truth's on matched arcs, over the largest kinetic energy or range of the potential.
 
     Max |E(t) - E_truth(t)| / the truth's largest energy. Instants of collisions that take no time are left
     out: several may share one, and a sample does not say behind which it stands.
@@ -51,7 +51,7 @@ def energy_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def energy_integrator(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Energy that the integrator made or lost, over the largest kinetic energy or the swing of the potential.
+    """Energy that the integrator made or lost, over the largest kinetic energy or range of the potential.
 
     Max |E - E(0) - input + dissipated - work of all rows| / the truth's largest energy; NaN without an
     account. What is left of E(t) - E(0) after the work of the inputs, of every multiplier and of damping.
@@ -67,7 +67,7 @@ def energy_integrator(truth: Truth, run: Trajectory, case: Case) -> float | None
 
 
 def energy_law(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Net energy that the contact law has given at most, over the largest kinetic energy.
+    """Largest net energy made by the contact law, over the largest kinetic energy.
 
     max(0, max over t of the work of all rows) / max T of the truth; NaN without an account. From the run's
     own account of the work of every multiplier (docs/explanation/model.md): above zero, the law made energy.
@@ -112,7 +112,7 @@ def energy_switching(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def energy_switching_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Energy that switching made by its formula against the ledger, over the largest kinetic energy, without damping.
+    """Energy made by switching, formula against ledger, over the largest kinetic energy; without damping.
 
     |sum of jumps - work of all rows| / max T of the truth. None with damping, whose work is not in the
     formula, and while rows still press, whose energy comes back; NaN without an account.

@@ -52,7 +52,7 @@ def divergence_time(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def rate_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Recorded velocities against the change of the recorded positions: the way that is not explained, over the whole.
+    """Recorded velocities against the change of the recorded positions: the unexplained part of it.
 
     Max over coordinates of |sum of (dq - v dt) sign(v)| / sum of |dq|, v dt by the trapezoidal rule between
     samples. Errors of the rule alternate where the motion bends to and fro; a factor on v does not. What

@@ -49,7 +49,7 @@ def _open(truth: Truth, run: Trajectory) -> NDArray[np.bool_]:
 
 
 def lam_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Multipliers of rows that are always on against the truth's, point by point, over the largest.
+    """Multipliers of rows that are always active against the truth's, point by point, over the largest.
 
     Max |lam - lam_truth| over max |lam_truth|, or what `idle` rows are measured by. None where a row can
     open, NaN where lam is not known. Where an instant stands twice lam jumps: its two sides are compared

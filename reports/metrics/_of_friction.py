@@ -27,7 +27,7 @@ def cone_violation(run: Trajectory, case: Case) -> float | None:
 
 
 def creep_speed(run: Trajectory, case: Case) -> float | None:
-    """Largest slip at the end of contacts that hold: zero where friction holds, whatever the bound on its force."""
+    """Largest slip speed at the end of sticking contacts: zero if friction holds, whatever the bound on its force."""
     if (found := rubbing(run, case)) is None:
         return None
     held = run.mode[-1, found.rows] == Mode.STICK
@@ -35,7 +35,7 @@ def creep_speed(run: Trajectory, case: Case) -> float | None:
 
 
 def friction_angle(run: Trajectory, case: Case) -> float | None:
-    """Largest angle between friction and what is against the slip, where a contact slides."""
+    """Largest angle between friction and the direction opposite to the slip, where a contact slides."""
     if (found := rubbing(run, case)) is None:
         return None
     slides, speed, force = sliding(run, found)
@@ -52,7 +52,7 @@ def friction_impulse(run: Trajectory, case: Case) -> Floats | None:
 
 
 def friction_power(run: Trajectory, case: Case) -> float | None:
-    """Largest power that friction of a pair of shapes gives: zero where it is against the slip."""
+    """Largest power that friction of a pair of shapes supplies: zero if it opposes the slip."""
     if (found := rubbing(run, case)) is None:
         return None
     return float(np.max(found.of_pairs(np.sum(found.force * found.slip, axis=-1)), initial=0.0))

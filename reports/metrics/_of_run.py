@@ -18,18 +18,18 @@ ALWAYS = False
 
 
 def bounces(run: Trajectory, case: Case) -> float | None:
-    """How often a body comes free again after a contact."""
+    """Number of times a body becomes free again after a contact."""
     return float(sum(event.after == Mode.FREE for event in run.events))
 
 
 def collision_impulse(run: Trajectory, case: Case) -> float | None:
-    """Impulse of all collisions that took no time."""
+    """Impulse of all instantaneous collisions."""
     impulses = [event.impulse for event in run.events if event.impulse]
     return sum(impulses) if impulses else None
 
 
 def contact_loss(run: Trajectory, case: Case) -> float | None:
-    """Energy that the contacts have taken until the end; without a ledger what is missing, the inputs' work too."""
+    """Energy lost in contacts until the end; without a ledger all missing energy, including the work of inputs."""
     if run.ledger is None:
         return float(run.total_energy[0] - run.total_energy[-1])
     return -float(run.ledger.contact[-1].sum())
@@ -41,7 +41,7 @@ def contact_time(run: Trajectory, case: Case) -> float | None:
 
 
 def contacts(run: Trajectory, case: Case) -> float | None:
-    """How often a contact begins."""
+    """Number of contacts that begin."""
     return float(len(contacts_of(run)))
 
 
@@ -80,5 +80,5 @@ def separation_gap(run: Trajectory, case: Case) -> float | None:
 
 
 def transitions(run: Trajectory, case: Case) -> float | None:
-    """How many transitions the state machine made, several at one instant too."""
+    """Number of transitions of the state machine, also several at one instant."""
     return float(len(run.events))

@@ -1,4 +1,4 @@
-"""Gaps where rows touch, come free or let go, by the recorded events, in ways of one step: zero where located.
+"""Gaps at the recorded events of rows, over the distance moved in one step: zero where events are located.
 
 It holds a run against itself, so that it judges engines that follow another law as well.
 """

@@ -1,4 +1,4 @@
-"""Recorded modes against those that the recorded events leave: an identity at every sample."""
+"""Recorded modes against those that follow from the recorded events: an identity at every sample."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Number of samples in a mode that no event left, and of events that do not follow on the one before.
 
     At the instant of an event a sample may stand before or behind it. Rows that open begin FREE; those
-    that follow another have no events and are left out. None without rows and where modes are not known.
+    that follow another have no events, and its mode at every sample. None without rows and where modes are not known.
     """
     if not run.mode.size or (run.mode < 0).any():
         return None
     system = equations(case)
     led = np.full(run.mode.shape[1], -1) if system is None else np.asarray(system.follows)
     first = np.where(case.law.unilateral, Mode.FREE, Mode.BILATERAL)
-    own = np.flatnonzero(led < 0).tolist()
-    return float(sum(_broken(run.t, run.mode[:, i], first[i], run.transitions(i)) for i in own))
+    own, led_by = np.flatnonzero(led < 0).tolist(), led[led >= 0]
+    unlike = np.sum(run.mode[:, led >= 0] != run.mode[:, led_by])
+    return float(unlike + sum(_broken(run.t, run.mode[:, i], first[i], run.transitions(i)) for i in own))
 
 
 def _broken(t: Floats, mode: Bytes, first: int, events: tuple[Event, ...]) -> int:

@@ -15,7 +15,7 @@ from crossbody.reports.judging.told import beyond, share
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.friction import friction, hysteresis
-from crossbody.reports.pages.html import Page
+from crossbody.reports.pages.html import Link, Page
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results
@@ -34,7 +34,7 @@ AUDIT = columns(
     verdict=("Same", Kind.VERDICT),
 )  # fmt: skip
 AUDIT_TEXT = (
-    "Before anything is compared, every engine must have the same physics. M, bias, H and lam "
+    "Before motions are compared, every engine must have the same physics: M, bias, H and lam "
     "are evaluated at the same random states."
 )
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
@@ -46,6 +46,7 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about), word=grid.verdict(rows),
         engines=[{"name": label(trace), **style(trace, i)} for i, trace in enumerate(traces)],
+        beside=_beside(found, case),
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
             *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
@@ -53,6 +54,13 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
             _runs(traces, case.about), _audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
+
+
+def _beside(found: Results, case: CaseFiles) -> tuple[Link | None, Link | None]:
+    """The pages of the cases before and after one."""
+    pages = [None, *(Link(page=one.page, title=one.label) for one in found.cases), None]
+    at = next(i for i, one in enumerate(pages) if one is not None and one.page == case.page)
+    return pages[at - 1], pages[at + 1]
 
 
 def _lead(about: Mapping[str, Any]) -> str:
@@ -76,7 +84,7 @@ def _glance(found: Results, case: CaseFiles) -> Section:
         context={
             "corner": "Metric", "heads": grid.heads(grid.ran(rows)), "wide": True, "filtered": False,
             "pages": (), "lines": grid.of_case(rows, case.page, case.label, _walls(found, case)),
-            "says": "A cell leads to its limit, its reason and the command that repeats it.",
+            "says": "Click a cell for its limit, the reason and the command that repeats it.",
         },
     )  # fmt: skip
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
+from crossbody.cases.scene_contacts import WAYS
 from crossbody.reports.figures.section import Figure, Plot
 from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import Row
@@ -25,8 +26,10 @@ SAMPLE = 16  # room of one sample of one line on a page, bytes (time and value a
 FEWEST = 60
 MOST_SIGNALS = 9
 """Coordinates and contacts drawn of a mechanism that has more: those that matter most."""
-FIRST = 3  # of these that are seen at once; the others are drawn when they are asked for
-BEYOND = 1.5  # times the truth's largest force up to which forces are drawn
+FIRST = {"motion": 3, "force": 2, "modes": 3, "penetration": 3}
+"""Of these, how many are seen at once in each figure; the others are drawn when they are asked for."""
+BEYOND, FAR = 1.5, 4.0
+"""Times the truth's largest force: up to which forces are drawn where any goes farther than the second."""
 NAMED = 6
 """Contacts without a force that are named; a robot has hundreds."""
 IDLE = 1e-9
@@ -138,10 +141,9 @@ def switching(traces: Sequence[Trace]) -> list[int]:
 def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, which: Sequence[int] = ()) -> Figure:
     """Coordinates of every engine, and under each log |difference to the truth|, impacts matched."""
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
-    # One floor a unit: a coordinate that stays at 0 is compared with its neighbours' size.
-    floors = {
-        unit: floor_of(traces[0].run.q[:, [k for k, (_, u) in enumerate(names) if u == unit]]) for _, unit in names
-    }
+    # One floor a unit, by the largest value in any run: a coordinate that stays at 0 has its neighbours' size.
+    sizes = _largest((trace.run.q for trace in traces), len(names))
+    floors = {unit: floor_of(sizes[[k for k, (_, u) in enumerate(names) if u == unit]]) for _, unit in names}
     shown = which or sorted(farthest(traces)[:MOST_SIGNALS])
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
     sheet = Sheet(rows, "Coordinates, and |difference from the truth|, impacts matched", points, group=2)
@@ -240,7 +242,7 @@ def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None,
     low, high = ends.get(TRUTH, (0.0, 0.0))
     reach = max(high, -low)
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
-    if not far or reach <= _noise(traces):
+    if max(far.values(), default=0.0) <= FAR * reach or reach <= _noise(traces):
         return None, {}
     return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), far
 
@@ -312,7 +314,7 @@ def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limi
     order = ranked(traces)[:MOST_SIGNALS]
     if not order:
         return []
-    cut = FIRST if len(order) > FIRST + 1 else len(order)
+    cut = FIRST[name] if len(order) > FIRST[name] + 1 else len(order)
     first, rest = sorted(order[:cut]), sorted(order[cut:])
     found = [Plot(name=f"plot-{name}", figure=draw(traces, points, limits, first), time=True)]
     if rest:
@@ -336,21 +338,31 @@ def note(name: str, traces: Sequence[Trace]) -> str:
         if len(found) > MOST_SIGNALS:
             told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
         if name in IDLE_NOTES and (rest := [names[k] for k in range(len(names)) if k not in found]):
-            told.append(f"{IDLE_NOTES[name]}: {few(rest)}.")
+            told.append(f"{IDLE_NOTES[name]}: {few(_normals(rest))}.")
+    if name == "energy" and (
+        without := [label(one) for one in traces if one.run.ledger is None and label(one) != TRUTH]
+    ):
+        told.append(f"Without an account of work, so that only their total energy is drawn: {', '.join(without)}.")
     if name == "modes":
         told += [*_same(traces), *_throughout(traces)]
     return " ".join(filter(None, told))
 
 
-def few(names: Sequence[str]) -> str:
+def few(names: Sequence[str], most: int = NAMED) -> str:
     """Some names, and how many more there are."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def _normals(names: Sequence[str]) -> list[str]:
+    """Names without the tangential rows of contacts that are among them."""
+    return [name for name in names if not (name[-2:] in WAYS and name[:-3] in names)]
 
 
 def _same(traces: Sequence[Trace]) -> Iterator[str]:
     names = traces[0].about["contacts"]
-    groups = [f"{', '.join(names[k] for k in rest)} as {names[first]}" for first, *rest in alike(traces) if rest]
+    same = [[names[first], *_normals([names[k] for k in (first, *rest)])[1:]] for first, *rest in alike(traces)]
+    groups = [f"{few(rest, 3)} as {first}" for first, *rest in same if rest]
     if groups:
         yield f"Alike: {'; '.join(groups[:NAMED])}{f'; and {len(groups) - NAMED} more' * (len(groups) > NAMED)}."
 
@@ -360,7 +372,7 @@ def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
     for contact, mode in changing(traces)[1]:
         found.setdefault(mode, []).append(contact)
     for mode, names in found.items():
-        yield f"{mode} throughout, in every engine: {few(names)}."
+        yield f"{mode} throughout, in every engine: {few(_normals(names))}."
 
 
 NOTES = {
@@ -370,11 +382,11 @@ NOTES = {
         "value of that unit. Across long steps of a solver, a cubic through q and v at both ends is drawn."
     ),
     "force": (
-        "A small delay of an impact changes lam at one instant a lot, but hardly its impulse: "
+        "A small delay of an impact changes lam a lot at one instant, but hardly its impulse: "
         "judge by the impulse. Instantaneous collisions are steps of the impulse."
     ),
 }
-IDLE_NOTES = {"force": "Without a force in every run", "penetration": "Never below the surface"}
+IDLE_NOTES = {"force": "Without force in every run", "penetration": "Never below the surface"}
 FIGURES: dict[str, tuple[str, Callable[..., Figure]]] = {
     "motion": ("Motion", motion),
     "force": ("Contact force", force),

@@ -13,25 +13,25 @@ from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import LEVEL, coded, label, plain, style
-from crossbody.reports.pages.figures import force_unit, robust
+from crossbody.reports.pages.figures import carrying, force_unit, robust
 from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 from crossbody.reports.scenes.scene import slip
 
+MOST_CONTACTS = 6  # of which one can be chosen
 MOST_OF_DEPTH = 1500  # points of one engine's line
 OVER_DEPTH = (
-    "Force over penetration depth of the contact with the largest load. A spring gives a "
-    "line; damping opens it to a loop whose area is the energy lost. A force below zero pulls."
+    "Force over penetration depth of one contact. A spring gives a line; damping opens it to a loop "
+    "whose area is the energy lost. A force below zero pulls."
 )
 LINE = {"color": LEVEL, "dash": "dash", "width": 1}
 DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
 MOST = 1000  # points of one engine's line
 TEXT = (
-    "For the contact with the largest load. The force of a sticking contact is inside the "
-    "cone, that of a sliding one on its edge; outside, it violates Coulomb's law. In the "
-    "plane of the contact, the friction force relative to mu lam is a point of the unit disc; "
-    "a sliding contact has it opposite to the slip."
+    "Of one contact. The force of a sticking contact is inside the cone, that of a sliding one on its "
+    "edge; outside, it violates Coulomb's law. In the plane of the contact, the friction force relative "
+    "to mu lam is a point of the unit disc; a sliding contact has it opposite to the slip."
 )
 
 
@@ -40,32 +40,48 @@ def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
 
     Nothing where no contact that opens and closes carries anything.
     """
-    if (k := _busiest(traces)) is None:
-        return []
-    lines = [line for i, trace in enumerate(traces) if (line := _over_depth(trace, i, k, int(share * MOST_OF_DEPTH)))]
-    name = traces[0].about["contacts"][k]
+    found = _busiest(traces)
+    most = _points(share * MOST_OF_DEPTH, len(found))
+    plots = [plot for i, k in enumerate(found) if (plot := _loop(traces, k, most, _numbered("plot-hysteresis", i)))]
+    return [Section(name="hysteresis", title="Force over depth", text=OVER_DEPTH, plots=plots)] if plots else []
+
+
+def _points(usual: float, contacts: int) -> int:
+    """Points of a line of each of some contacts: all of them have no more than twice the room of one."""
+    return max(int(2.0 * usual / (contacts + 1)), 2)
+
+
+def _numbered(name: str, i: int) -> str:
+    return f"{name}-{i + 1}" if i else name
+
+
+def _loop(traces: Sequence[Trace], k: int, most: int, name: str) -> Plot | None:
+    """Force over depth of one contact in every engine."""
+    lines = [line for i, trace in enumerate(traces) if (line := _over_depth(trace, i, k, most))]
+    contact = traces[0].about["contacts"][k]
     ends, far = robust(traces, k)
     unit = force_unit(traces, k)
-    off = off_scale({who: [(size, unit, name)] for who, size in far.items()})
-    title = f"Force over depth, contact {plain(name)}{off and f'. Off scale: {plain(off)}'}"
+    off = off_scale({who: [(size, unit, contact)] for who, size in far.items()})
+    title = f"Force over depth, contact {plain(contact)}{off and f'. Off scale: {plain(off)}'}"
     layout = {
         "title": {"text": title}, "height": 420, "showlegend": False,
         "xaxis": {"title": {"text": f"depth [{'m' if unit == 'N' else 'rad'}]"}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": f"lam [{unit}]"}, "exponentformat": "power"}
+        "yaxis": {"title": {"text": f"lam [{unit}]"}, "exponentformat": "power", "rangemode": "tozero"}
         | ({"range": list(ends)} if ends else {}),
     }  # fmt: skip
-    plots = (Plot(name="plot-hysteresis", figure={"data": lines, "layout": layout}),)
-    return [Section(name="hysteresis", title="Force over depth", text=OVER_DEPTH, plots=plots)] if lines else []
+    return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact) if lines else None
 
 
-def _busiest(traces: Sequence[Trace]) -> int | None:
-    """The contact with the largest force in the first motion that has any, of those that open and close."""
+def _busiest(traces: Sequence[Trace]) -> list[int]:
+    """Contacts that open and close and carry a force, those first that carry most in the first motion with any."""
+    bearing = carrying(traces) if traces else []
     for trace in traces:
-        lam = np.abs(np.nan_to_num(trace.run.lam))
+        lam = np.abs(np.nan_to_num(trace.run.lam)).max(axis=0, initial=0.0)
         lam = np.where((trace.run.mode == Mode.BILATERAL).all(axis=0), 0.0, lam)
         if lam.size and lam.max() > 0.0:
-            return int(np.argmax(lam.max(axis=0)))
-    return None
+            order = np.argsort(-lam, kind="stable")
+            return [int(k) for k in order if lam[k] > 0.0 and int(k) in bearing][:MOST_CONTACTS]
+    return []
 
 
 def _over_depth(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
@@ -87,38 +103,44 @@ def _over_depth(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
 
 def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     """The section, with a share of the usual points; nothing where no contact with friction is pressed."""
-    if (found := _pressed(traces)) is None:
-        return []
-    contact, place = found
-    name, most = contact.normals[place], max(int(share * MOST), 2)
-    lines: list[tuple[dict[str, Any], ...]] = [
-        (_line(trace, i, (rows[:, 0], across), most), _line(trace, i, parts, most))
-        for i, trace in enumerate(traces)
-        for rows, across, parts in (_forces(trace, contact, place),)
-    ]
-    top = max(float(np.nanmax(_forces(trace, contact, place)[0][:, 0], initial=0.0)) for trace in traces)
+    found = _pressed(traces)
+    most = _points(share * MOST, len(found))
+    plots = [plot for i, (contact, place) in enumerate(found) for plot in _rubbing(traces, contact, place, most, i)]
+    told = {"beside": True}
+    return [Section(name="friction", title="Friction", text=TEXT, plots=plots, context=told)] if plots else []
+
+
+def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i: int) -> list[Plot]:
+    """The cone, the plane and, where it is known, the slip of one contact in every engine."""
+    name = contact.normals[place]
+    forces = [_forces(trace, contact, place) for trace in traces]
+    cone = [_line(one, j, (forces[j][0][:, 0], forces[j][1]), most) for j, one in enumerate(traces)]
+    plane = [_line(one, j, forces[j][2], most) for j, one in enumerate(traces)]
+    top = max(float(np.nanmax(rows[:, 0], initial=0.0)) for rows, *_ in forces)
     plots = [
-        _plot("cone", f"Friction over normal force, {name}", [one for one, _ in lines],
-              ("lam [N]", "|friction| [N]"), [_edge(contact.friction, top)]),
-        _plot("plane", f"Friction over mu lam in the plane, {name}", [one for _, one in lines],
-              ("friction t1 / (mu lam)", "friction t2 / (mu lam)"), [DISC], square=True),
+        _plot("cone", i, f"Friction over normal force, {name}", cone,
+              ("lam [N]", "|friction| [N]"), [_edge(contact.friction, top)], name),
+        _plot("plane", i, f"Friction over mu lam in the plane, {name}", plane,
+              ("friction t1 / (mu lam)", "friction t2 / (mu lam)"), [DISC], name),
     ]  # fmt: skip
     if contact.first.type == "plane":
-        slips = [_line(trace, i, _slipping(trace, contact, place), most) for i, trace in enumerate(traces)]
-        plots.append(_plot("slip", f"Slip, {name}", slips, ("slip t1 [m/s]", "slip t2 [m/s]"), [], square=True))
-    return [Section(name="friction", title="Friction", text=TEXT, plots=plots, context={"beside": True})]
+        slips = [_line(trace, j, _slipping(trace, contact, place), most) for j, trace in enumerate(traces)]
+        plots.append(_plot("slip", i, f"Slip, {name}", slips, ("slip t1 [m/s]", "slip t2 [m/s]"), [], name))
+    return plots
 
 
-def _pressed(traces: Sequence[Trace]) -> tuple[Contact, int] | None:
-    """The contact with friction, and its place, that carries most in the first motion with any."""
+def _pressed(traces: Sequence[Trace]) -> list[tuple[Contact, int]]:
+    """Contacts with friction, and their places, those first that carry most in the first motion with any."""
     told = traces[0].about.get("scene") if traces else None
     rubs = [one for one in contacts(scene_from(told)) if one.friction > 0.0] if told else []
     places = [(one, k) for one in rubs for k in range(one.places)]
+    bearing = {traces[0].about["contacts"][k] for k in carrying(traces)} if places else set()
     for trace in traces:
-        loads = [float(np.nanmax(_rows(trace, one, k)[:, 0], initial=0.0)) for one, k in places]
-        if loads and max(loads) > 0.0:
-            return places[int(np.argmax(loads))]
-    return None
+        loads = np.array([float(np.nanmax(_rows(trace, one, k)[:, 0], initial=0.0)) for one, k in places])
+        if loads.max(initial=0.0) > 0.0:
+            ranked = [places[i] for i in np.argsort(-loads, kind="stable") if loads[i] > 0.0]
+            return [(one, k) for one, k in ranked if one.normals[k] in bearing][:MOST_CONTACTS]
+    return []
 
 
 def _rows(trace: Trace, contact: Contact, place: int) -> Floats:
@@ -159,18 +181,19 @@ def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dic
 
 
 def _plot(
-    name: str, title: str, lines: list[dict[str, Any]], axes: tuple[str, str],
-    shapes: list[dict[str, Any]], *, square: bool = False,
+    kind: str, i: int, title: str, lines: list[dict[str, Any]], axes: tuple[str, str],
+    shapes: list[dict[str, Any]], contact: str,
 ) -> Plot:  # fmt: skip
     x, y = axes
     layout = {
         "title": {"text": title}, "height": 420, "showlegend": False, "shapes": shapes,
         "xaxis": {"title": {"text": x}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": y}, "exponentformat": "power"} | ({"scaleanchor": "x"} if square else {}),
+        "yaxis": {"title": {"text": y}, "exponentformat": "power"} | ({} if kind == "cone" else {"scaleanchor": "x"}),
     }  # fmt: skip
-    return Plot(name=f"plot-friction-{name}", figure={"data": lines, "layout": layout})
+    figure = {"data": lines, "layout": layout}
+    return Plot(name=_numbered(f"plot-friction-{kind}", i), figure=figure, choice=contact)
 
 
 def _edge(mu: float, top: float) -> dict[str, Any]:
-    text = {"text": f"mu lam, mu = {mu:g}", "font": {"size": 10, "color": LEVEL}}
+    text = {"text": f"mu lam, mu = {mu:g}", "font": {"size": 11, "color": LEVEL}, "textposition": "start"}
     return {"type": "line", "x0": 0.0, "y0": 0.0, "x1": top, "y1": mu * top, "line": LINE, "label": text}

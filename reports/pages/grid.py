@@ -114,7 +114,7 @@ def verdict(rows: Sequence[Row]) -> str:
 def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | None) -> Cell:
     """The cell of one engine on one case: worst verdict, error of position and run time."""
     if not rows:
-        return Cell(title=f"{who} was not asked for {label}.")
+        return Cell(title=f"{who} was not selected for {label}.")
     word, text = worst(rows)
     error = next((row["value"] for row in rows if row["metric"] == "position"), None)
     parts = ["" if error is None or error != error else f"{error:.0e}", duration(wall)]

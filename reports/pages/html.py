@@ -26,7 +26,7 @@ import jinja2
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.bccache import Bucket, BytecodeCache
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from crossbody.cases import OutputError
@@ -57,6 +57,11 @@ UNITLESS = re.compile(r"(<br>|\s)*\[1\]$")  # what a number without a unit would
 def packed_text(text: str) -> str:
     """A text as base64 of gzip."""
     return _folded(text.encode())
+
+
+def breakable(text: str) -> Markup:
+    """A name that a narrow column may break behind its colons and underscores."""
+    return Markup(re.sub("([:_])", r"\1<wbr>", str(escape(text))))
 
 
 def packed_value(value: Any) -> str:
@@ -119,6 +124,14 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Link:
+    """One entry of the navigation: the name of a page, and what to call it."""
+
+    page: str
+    title: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Page:
     """One page.
 
@@ -129,6 +142,7 @@ class Page:
         lead: one line below the heading.
         word: the verdict in few words, for the name of the window.
         engines: label and style of every engine that can be shown and hidden on it.
+        beside: the pages before and after it, if it is one of a row.
     """
 
     name: str
@@ -137,14 +151,7 @@ class Page:
     lead: str = ""
     word: str = ""
     engines: Sequence[Mapping[str, Any]] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Link:
-    """One entry of the navigation: the name of a page, and what to call it."""
-
-    page: str
-    title: str
+    beside: tuple[Link | None, Link | None] = (None, None)
 
 
 @cache
@@ -157,6 +164,7 @@ def environment() -> Environment:
     )  # fmt: skip
     made.filters |= {
         "number": number,
+        "breakable": breakable,
         "bounded": bounded,
         "slug": slug,
         "told": told,
@@ -214,9 +222,7 @@ def _bytes(name: str) -> bytes:
     try:
         return (TEMPLATES / name).read_bytes()
     except FileNotFoundError:
-        raise OutputError(
-            f"{TEMPLATES / name} is not there; installing crossbody (pip install) puts it there."
-        ) from None
+        raise OutputError(f"{TEMPLATES / name} is missing; installing crossbody (pip install) creates it.") from None
 
 
 @cache

@@ -187,4 +187,4 @@ def _version(found: Results) -> str:
         mine = version("crossbody")
     except PackageNotFoundError:
         return ""
-    return "" if by == mine else f"These results were made by crossbody {by}; the pages by {mine}."
+    return "" if by == mine else f"These results were computed by crossbody {by}, the pages by {mine}."

@@ -243,7 +243,7 @@ def write(film: Film, path: Path, t: float, fps: float, speed: float) -> None:
     if path.suffix not in SUFFIXES:
         raise InvalidValue(f"{path.name} is not a known kind of picture; valid: {', '.join(SUFFIXES)}.")
     if not 0.0 <= t <= end:
-        raise InvalidValue(f"There is no instant {t:g} s; the motion lasts from 0 to {end:g} s.")
+        raise InvalidValue(f"{t:g} s is outside the motion, which lasts from 0 to {end:g} s.")
     if path.suffix == ".gif":
         count = max(int(end / speed * fps), 1) + 1
         first, *rest = (raster(film.at(float(one))) for one in np.linspace(0.0, end, count))

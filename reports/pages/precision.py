@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,17 @@ def _mark(place: int) -> dict[str, str]:
     return {"color": COLOURS[place % len(COLOURS)], "symbol": SYMBOLS[place % len(SYMBOLS)]}
 
 
+def _sides(heights: Sequence[float]) -> list[str]:
+    """Where a name stands beside a mark of some height: of marks of about one height above, at or below it."""
+    order = sorted(range(len(heights)), key=lambda i: heights[i])
+    logs = [math.log10(max(heights[i], FLOOR)) for i in order]
+    close = 0.05 * (max(logs, default=0.0) - min(logs, default=0.0) + 1.0)
+    near = [False, *(b - a < close for a, b in pairwise(logs)), False]
+    sides = {(False, True): "bottom", (True, False): "top"}
+    found = {i: sides.get((below, above), "middle") for i, (below, above) in zip(order, pairwise(near), strict=True)}
+    return [found[i] for i in range(len(heights))]
+
+
 def scatter(points: Sequence[tuple[str, float, float]], places: Mapping[str, int]) -> Figure:
     """One mark an engine: error of position (relative), run time in ms."""
     finite = [error for _, error, _ in points if math.isfinite(error)]
@@ -109,11 +121,11 @@ def scatter(points: Sequence[tuple[str, float, float]], places: Mapping[str, int
             "x": [max(error, FLOOR) if math.isfinite(error) else edge], "y": [ms],
             "name": plain(who), "meta": who, "text": [plain(who)],
             # names stand inside the plot
-            "textposition": "middle left" if not math.isfinite(error) or error > 1e-4 * edge else "middle right",
+            "textposition": f"{side} left" if not math.isfinite(error) or error > 1e-4 * edge else f"{side} right",
             "textfont": {"size": 11}, "cliponaxis": False,
             "marker": _mark(places[who]) | {"size": 10} | ({} if math.isfinite(error) else {"symbol": "x"}),
         }
-        for who, error, ms in points
+        for (who, error, ms), side in zip(points, _sides([ms for *_, ms in points]), strict=True)
     ]  # fmt: skip
     layout = {
         "title": {"text": "Run time against error of position"}, "height": 420, "showlegend": False,

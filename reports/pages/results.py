@@ -177,7 +177,7 @@ def _missing(label: str, engines: list[str], times: Times, broken: list[str]) ->
         return ()
     names = ", ".join(who.removesuffix(":") for who in lost)
     unreadable = f" (not readable: {', '.join(broken)})" if broken else ""
-    return (f"No motion is stored for {names}{unreadable}: what is drawn below is without it.",)
+    return (f"No motion is stored for {names}{unreadable}, which is missing in the figures below.",)
 
 
 def check(against: Path | None, others: Sequence[Path]) -> None:

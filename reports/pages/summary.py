@@ -20,7 +20,7 @@ from crossbody.reports.runs.study import read_json
 REFERENCE = "reference:compiled"
 NAMED = 6  # metrics that are named of a deviation, those farthest out first
 TEXT = (
-    "A case is trusted with an engine if everything that is judged is within its limit. Errors are "
+    "An engine counts as trusted on a case if every judged number is within its limit. Errors are "
     "of position, relative to its largest value. Run times are relative to those of "
     "reference:compiled for the same case, each at its own setting and therefore at its own error; "
     "for the cost of the same error, run a benchmark (crossbody bench, then crossbody report --with)."
@@ -37,7 +37,7 @@ COLUMNS = columns(
     ratio=("At its best error", Kind.NUMBER),
 )  # fmt: skip
 KNOWN = columns(
-    who="Engine", why=("What is known of it", Kind.LONG), metrics="Metrics", cases=("Cases", Kind.NUMBER),
+    who="Engine", why=("Known properties", Kind.LONG), metrics="Metrics", cases=("Cases", Kind.NUMBER),
     rows=("Rows", Kind.NUMBER), most=("Farthest [limits]", Kind.NUMBER), where="On",
 )  # fmt: skip
 

@@ -78,7 +78,7 @@ def profile(rows: pd.DataFrame, estimates: pd.DataFrame) -> Figure:
         values, rise = line["value"].to_numpy(float), line["cost"].to_numpy(float) - 1.0
         data.append(_line(values, rise, name, place) | {"mode": "lines+markers", "showlegend": False})
         shapes.append(_rectangle(place, x=(float(known["low"][name]), float(known["high"][name]))))
-    layout = _figure("Cost about each estimate, less that at it; 95 % interval in grey", data,
+    layout = _figure("Cost near each estimate minus the cost at it; 95 % interval in grey", data,
                      ["rise of the\ncost [1]"] * len(names), "", shapes)  # fmt: skip
     for place, name in enumerate(names, start=1):
         axis = layout["layout"][f"xaxis{number(place)}"]

@@ -119,7 +119,7 @@ def _table(group: GroupSurvey) -> str:
 
 def _show_findings(findings: Sequence[Finding]) -> None:
     if not voice.quiet():
-        print("\nFindings:" if findings else "\nNothing is wrong with it.")
+        print("\nFindings:" if findings else "\nNo faults were found.")
     for one in findings:
         kind = "fault" if one.fault else "note"
         when = f", t = {one.t:.9g} s" if math.isfinite(one.t) else ""

@@ -27,7 +27,7 @@ def tables(folder: Path) -> list[Path]:
     found = [path for path in paths if path.suffix in TABLES and path.stem not in OWN]
     if not found:
         raise OutputError(
-            f"{folder} holds no study: name a folder that crossbody bench, stress, gapmap, "
+            f"{folder} contains no study: name a folder that crossbody bench, stress, gapmap, "
             "stability, bode, analyse, replay or identify wrote."
         )
     return found
@@ -46,4 +46,4 @@ def take(made: Path, others: Sequence[Path]) -> None:
         except OutputError:
             raise
         except OSError as error:
-            raise OutputError(f"{path} cannot be taken into {made.parent}: {error.strerror}.") from None
+            raise OutputError(f"{path} cannot be copied into {made.parent}: {error.strerror}.") from None

@@ -146,7 +146,7 @@ def check_asked(settings: Mapping[str, Value], wanted: Sequence[Pick]) -> None:
     for name in settings:
         who, dot, key = name.rpartition(".")
         if dot and not (who and key):
-            raise InvalidValue(f"--set-engine {name}= names no {'setting' if who else 'engine'}; mujoco.dt=1e-4 would.")
+            raise InvalidValue(f"--set-engine {name}= has no {'setting' if who else 'engine'}; mujoco.dt=1e-4 would.")
     for who in {name.rpartition(".")[0] for name in settings} - {""}:
         name, profile = parse_engine(who)
         known = {pick.engine for pick in wanted}

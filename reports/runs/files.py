@@ -83,7 +83,7 @@ def _inside(where: int, name: str, folder: Path) -> int:
     except OSError as error:
         if error.errno not in (errno.ELOOP, errno.ENOTDIR):
             raise
-        raise OutputError(f"{folder / name} is a link or no folder; crossbody follows no link there.") from None
+        raise OutputError(f"{folder / name} is a link, or not a folder; crossbody follows no links there.") from None
 
 
 def decoded(text: bytes) -> Any:
@@ -113,7 +113,7 @@ def open_inside(folder: Path, name: str) -> BinaryIO:
     with directory(folder, "" if len(place.parts) == 1 else str(place.parent)) as where:
         mode = os.stat(place.name, dir_fd=where, follow_symlinks=False).st_mode
         if not stat.S_ISREG(mode):
-            raise OutputError(f"{folder / name} is a link or no file; crossbody follows no link there.")
+            raise OutputError(f"{folder / name} is a link, or not a file; crossbody follows no links there.")
         return open_regular(place.name, os.O_NOFOLLOW, where)
 
 

@@ -92,9 +92,7 @@ def run_case(
     """
     asked = dict(settings or {}) | ({} if rtol is None else {"rtol": rtol})
     if "samples" in asked:
-        raise InvalidValue(
-            "A run that is judged takes the samples that its events and its motion need: leave samples out."
-        )
+        raise InvalidValue("A judged run chooses its own samples by its events and motion: omit samples.")
     check_names(case)
     if not case.general:
         ahead.ask("SUNDIALS")
@@ -212,7 +210,7 @@ def _dear(case: Case, pick: Pick, asked: Mapping[str, Value], most: float) -> st
 
 def _too_dear(pick: Pick, cost: str) -> str:
     who = f"-e {pick.engine}:{pick.profile}"
-    return f"Too expensive: it would take {cost}. {who} runs it all the same, as does a larger --budget."
+    return f"Too expensive: it would take {cost}. {who} runs it anyway, and so does a larger --budget."
 
 
 def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:
@@ -292,7 +290,7 @@ def _study(
     if prepared.follows is not None:
         return Study(**told)
     if not size:
-        return Study(why="It has neither a step nor a tolerance that could be refined.", **told)
+        return Study(why="It has neither a step nor a tolerance that can be refined.", **told)
     setting = next(iter(size))
     for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
         cost = _cost(setting, sizes, size[setting], took)
@@ -300,7 +298,7 @@ def _study(
             sizes = sizes[:-1]
             cost = _cost(setting, sizes, size[setting], took)
         if case.general and cost > most:
-            return Study(why=f"Runs with other {setting} that tell it would take about {cost:.0f} s.", **told)
+            return Study(why=f"The runs with other {setting} that are needed would take about {cost:.0f} s.", **told)
         known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
         runs = [known.get(one) or run(**of_scene, **{setting: one}, **samples) for one in sizes]
         if not (failed := [one for one in runs if isinstance(one, str)]):

@@ -281,13 +281,13 @@ def recover(path: Path) -> None:
             for half in path.glob(f"{HALF}*"):
                 half.unlink()
     except OSError as error:
-        raise OutputError(f"Output folder {path} cannot be put in order: {error.strerror or error}.") from None
+        raise OutputError(f"Output folder {path} cannot be completed: {error.strerror or error}.") from None
 
 
 def _recover(home: Path, left: Path) -> None:
     if left.name.startswith(READY):
         _place(home, left)
-        voice.note(f"{home}: results that an interrupted command had written are put in their place.")
+        voice.note(f"{home}: the results of an interrupted command have been moved to their place.")
         return
     shutil.rmtree(left, ignore_errors=True)
-    voice.note(f"{home}: half-written tables of an interrupted command are removed.")
+    voice.note(f"{home}: incomplete tables of an interrupted command have been removed.")

@@ -160,7 +160,7 @@ def _check(told: Any, where: str, kinds: Mapping[str, type | tuple[type, ...]]) 
         ValueError: naming the first that it has not.
     """
     if not isinstance(told, dict):
-        raise ValueError("its metadata is no object")
+        raise ValueError("its metadata is not an object")
     for name, kind in kinds.items():
         if not isinstance(given := told.get(name), kind):
             raise ValueError(f"its field {where}{name} is {str(given)[:60]!r}")

@@ -71,7 +71,7 @@ def stage(p: Parameters) -> Stage:
     """Return what is drawn of every body."""
     scene = _scene(p)
     if len(scene.bodies) > MOST:
-        raise ValueError(f"it has {len(scene.bodies)} bodies, and at most {MOST} are drawn")
+        raise ValueError(f"it has {len(scene.bodies)} bodies; at most {MOST} can be drawn")
     index = {"": -1} | {body.name: i for i, body in enumerate(scene.bodies)}
     shown = {shape.body for shape in scene.shapes}
     boxes = [_inertia_box(body, i) for i, body in enumerate(scene.bodies) if body.name not in shown and body.mass]

@@ -55,9 +55,9 @@ def shown(name: str, out: Path) -> tuple[Section, ...]:
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
         wrote, mine = _written_by(out), version("crossbody")
         told = (
-            f"These tables cannot be shown ({type(error).__name__}: {error}), though this "
-            "version wrote them: they were changed, or it is a fault of crossbody. Run the "
-            "study again; report it if it stays."
+            f"These tables cannot be shown ({type(error).__name__}: {error}), although this "
+            "version wrote them: they were changed, or this is a fault of crossbody. Run the "
+            "study again, and report it if it persists."
             if wrote == mine
             else f"Another version of crossbody wrote these tables ({wrote or 'unknown'}; {error} is not as "
             "expected): run the study again."

@@ -25,7 +25,7 @@ HELD = columns(
     change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 MEANS = {
-    "rmse": "root mean square of measured less predicted",
+    "rmse": "root mean square of measured minus predicted",
     "end_median": "at the end of a window, median over windows",
     "end_90": "at the end of a window, 90 % quantile over windows",
 }

@@ -25,20 +25,20 @@ METRICS = columns(
 )  # fmt: skip
 MEANS = {
     "fit": "share of the measured motion that is explained, 100 at best",
-    "rmse": "root mean square of measured less predicted",
-    "largest": "largest of measured less predicted",
-    "bias": "mean of measured less predicted",
+    "rmse": "root mean square of measured minus predicted",
+    "largest": "largest of measured minus predicted",
+    "bias": "mean of measured minus predicted",
     "delay": "how much later the measurement is than the prediction",
     "noise": "of the measurement, one standard deviation",
     "unexplained": "rmse without the noise",
-    "autocorrelation": "lags of the residuals' own correlation inside the band of noise, 99 at best",
+    "autocorrelation": "lags of the residuals' autocorrelation inside the band of noise, 99 at best",
     "crosscorrelation": "lags of the residuals' correlation with an input inside the band, 99 at best",
-    "error": "size of the error so long after the start of a window: median, or 90 % quantile",
-    "impacts": "impacts predicted less those measured",
+    "error": "size of the error at this time after the start of a window: median, or 90 % quantile",
+    "impacts": "impacts predicted minus impacts measured",
     "impact": "instants of impacts against the measured ones",
-    "impulse": "sum over all impacts: its error, or what was measured",
+    "impulse": "sum over all impacts: its error, or the measured sum",
     "windows": "windows whose prediction failed",
-    "speed": "time of the motion over the time that the computation took",
+    "speed": "duration of the motion over the computing time",
 }
 """What metrics say, by the first words of their names."""
 FINDINGS = columns(

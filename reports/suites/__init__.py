@@ -48,7 +48,7 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
 
         return suite_of(name, fixed or {})
     if fixed:
-        raise InvalidValue(f"The suite {name!r} has parameters of its own: {', '.join(fixed)} cannot be given.")
+        raise InvalidValue(f"The suite {name!r} has fixed parameters: {', '.join(fixed)} cannot be given.")
     if name in SUITES:
         return SUITES[name]
     if module is None and name not in _REGISTRY.names():

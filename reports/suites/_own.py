@@ -59,7 +59,7 @@ SUITES: Mapping[str, Suite] = {
         ),
     ),
     "cubic": Suite(
-        about="Floors with a cubic term up to 1e12 1/(m^2 s^2), held against an independent integrator.",
+        about="Floors with a cubic term up to 1e12 1/(m^2 s^2), compared with an independent integrator.",
         runs=120,
         families=(
             cubic(scene=scenes.damped, second=5, fixed={"t_end": 2.0},
@@ -97,7 +97,7 @@ SUITES: Mapping[str, Suite] = {
     ),
     # Balls that overlap leave at nearly the same speed, and when they meet again is known the worse for it.
     "gap": Suite(
-        about="Gaps between neighbours from 0 to 0.1 m, from collisions that overlap to such that come one by one.",
+        about="Gaps between neighbours from 0 to 0.1 m, from overlapping collisions to collisions one by one.",
         runs=160,
         families=(
             sliders(scene=scenes.lifted, grid={"collisions": RULES},
@@ -121,7 +121,7 @@ SUITES: Mapping[str, Suite] = {
     # The speed at a touch is the square root of how deep the pass would be, and an error of the swing comes out as one
     # of its square root. At passes closer than the tolerance even whether they touch is open: motions diverge there.
     "grazing": Suite(
-        about="Passes that just touch or just do not: a pendulum whose far end of the swing is where its neighbour "
+        about="Passes that barely touch or barely miss: a pendulum whose far end of the swing is where its neighbour "
         "hangs.",
         runs=150,
         families=(
@@ -131,7 +131,8 @@ SUITES: Mapping[str, Suite] = {
         ),
     ),
     "impulses": Suite(
-        about="Impulses of 1e-6 to 1e4 N s on the delta robot's flange, as pulses of any length and in no time.",
+        about=("Impulses of 1e-6 to 1e4 N s on the delta robot's flange, as pulses of any length and "
+            "instantaneous ones."),
         runs=12,
         families=(
             Family(case="delta_impulse", variant="light", scene=scenes.anywhere, fixed={"t_end": 0.5, "start": 0.0},
@@ -142,7 +143,7 @@ SUITES: Mapping[str, Suite] = {
     ),
     # A light ball between heavy ones collides pi sqrt(ratio) / 2 times: three and more balls stop at a ratio of 1e6.
     "mass_ratio": Suite(
-        about="Rows of balls with mass ratios of up to 1e12, collisions in no time and in real time.",
+        about="Rows of balls with mass ratios of up to 1e12, instantaneous collisions and collisions in real time.",
         runs=200,
         families=(
             sliders(scene=scenes.uneven, grid={"collisions": RULES, "gap": GAPS}, fixed={"n": 2},
@@ -198,8 +199,8 @@ SUITES: Mapping[str, Suite] = {
     # At 1e-6 m/s the default absolute tolerance of 1e-12 is a millionth of all there is. A hard floor that damps little
     # is bounced on at such speeds more often than the bound on steps allows.
     "speed": Suite(
-        about="Speeds of impact from 1e-6 to 1e3 m/s, with and without gravity, around the speed below which nothing "
-        "leaves.",
+        about=("Speeds of impact from 1e-6 to 1e3 m/s, with and without gravity, around the speed below which "
+            "a ball does not leave."),
         runs=560,
         families=(
             ball(fixed={"height": 0.0, "t_end": 0.5}, ladder=TIGHT, finishes=False,
@@ -215,7 +216,7 @@ SUITES: Mapping[str, Suite] = {
     # Its truth is exact between events and looks for them in a way of its own. Contacts of stiff walls multiply an
     # error: where the scene beside it parts from it by as much, a run is judged up to there.
     "springs_and_walls": Suite(
-        about="Masses on springs beside one to three walls: a catch or a release in a window of any width, somewhere "
+        about="Masses on springs near one to three walls: a touch or a release in a window of any width, somewhere "
         "in a step.",
         runs=200, engines=("reference:compiled",),
         families=(
@@ -250,8 +251,8 @@ SUITES: Mapping[str, Suite] = {
     # Servos move within a step or two here, and the energy account is a quadrature beside the motion, which sets the
     # steps.
     "torque": Suite(
-        about="Steps of torque on the delta robot: servos of any gain pulled out of place, towards its singular pose "
-        "too.",
+        about=("Steps of torque on the delta robot: servos of any gain pulled out of place, also towards its "
+            "singular pose."),
         runs=12,
         families=(
             Family(case="delta_impulse", variant="servos", fixed={"t_end": 0.5}, second=20, finishes=False,

@@ -1,4 +1,4 @@
-"""A case drawn at random: masses on springs beside walls, M q'' = g - K q with gaps H q + c, started outside of all.
+"""A case drawn at random: masses on springs near walls, M q'' = g - K q with gaps H q + c, started outside of all.
 
 M, K and H are constant, so that its truth needs no integrator (`_linear_arcs`).
 """
@@ -17,8 +17,8 @@ from crossbody.reports.suites._linear_arcs import LinearArcs
 
 PARAMETERS = {
     "n": Parameter(default=2, doc="number of coordinates", low=1, high=3),
-    "walls": Parameter(default=1, doc="number of walls, of which the first n are there", low=1, high=3),
-    "draw": Parameter(default=0, doc="seed of everything that is not named here", low=0, high=2**32 - 1),
+    "walls": Parameter(default=1, doc="number of walls; the first n exist", low=1, high=3),
+    "draw": Parameter(default=0, doc="seed of everything that is not given here", low=0, high=2**32 - 1),
     "a0": Parameter(default=1e4, unit="1/s^2", doc="stiffness of the walls", low=0.0, open_low=True),
     "zeta": Parameter(default=0.1, doc="damping ratio of the walls", low=0.0),
     "stiffness": Parameter(default=5.0, unit="N/m", doc="scale of the springs", low=0.0, open_low=True),
@@ -123,7 +123,7 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     law = Law(a0=a0, a1=a1, a2=np.zeros(len(a0)), unilateral=np.ones(len(a0), dtype=np.bool_))
     t_end = float(parameters["t_end"])
     return Case(
-        name="springs_and_walls", variant=variant, title="masses on springs beside walls", mechanism=__file__,
+        name="springs_and_walls", variant=variant, title="masses on springs near walls", mechanism=__file__,
         parameters=parameters, coordinates=tuple(Coordinate(name=f"q{i}", unit="m") for i in range(len(x.M))),
         contacts=tuple(f"wall {i}" for i in range(len(a0))), q0=x.q0, v0=x.v0, t_end=t_end, law=law,
         closed_form=LinearArcs(x.M, x.K, x.g, x.H, x.c, x.q0, x.v0, a0, a1, t_end),

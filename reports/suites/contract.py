@@ -94,8 +94,8 @@ class Family:
             for other in sources[i + 1 :]:
                 for name in one.keys() & other.keys():
                     raise InvalidValue(
-                        f"{self.case}:{self.variant}: {name} is asked for twice, in the grid, "
-                        "among the axes or fixed; name it once."
+                        f"{self.case}:{self.variant}: {name} is given twice, in the grid, "
+                        "the axes or fixed; give it once."
                     )
         if not self.axes and not self.grid and self.ladder is None:
             raise InvalidValue(f"{self.case}:{self.variant}: a family needs an axis, a grid or a ladder.")

@@ -86,7 +86,9 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     shifts = [shift for start, shift in _shifts(truth, run) if start < until]
     apart = float(np.max(_apart(truth, run)[run.t < until], initial=0.0))
     value = max(apart, _with_trace(max(shifts, default=0.0) / case.t_end, apart))
-    return Error(value=value, tier=found.tier, until=until, why=f"diverges at t = {until:.3g} s; behind, {found.why}")
+    return Error(
+        value=value, tier=found.tier, until=until, why=(f"diverges at t = {until:.3g} s; after that, {found.why}")
+    )
 
 
 def _truth(case: Case, times: Floats, asked: Asked) -> Truth | str:

@@ -30,7 +30,7 @@ Chunk = tuple[int, Sequence[Spec]]
 Task = TypeVar("Task")
 Done = TypeVar("Done")
 ANSWER = 4.0  # time that a scheduler has to answer, s
-ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was ended"
+ENDED = "the process ended during this run: it crashed, ran out of memory, or hung and was terminated"
 
 
 def together(specs: Iterable[Spec]) -> list[dict[str, Any]]:
@@ -188,7 +188,9 @@ class Tls:
         if self == Tls():
             return None
         if not (self.ca and self.cert):
-            raise InvalidValue("--tls-ca and --tls-cert belong together: both ends of a connection have to be known.")
+            raise InvalidValue(
+                "--tls-ca and --tls-cert must be given together: both ends of a connection must be known."
+            )
         from distributed import Security
 
         security = Security(

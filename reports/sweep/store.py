@@ -55,7 +55,7 @@ class Store:
     def _begin(self) -> None:
         """Make the folder and its marker, unless it is ours already, then what says which sweep it is."""
         if os.path.lexists(self.path / PARTS):
-            raise OutputError(f"{self.path / PARTS} is in the way; move it, or name a new folder for the sweep.")
+            raise OutputError(f"{self.path / PARTS} exists; move it, or name a new folder for the sweep.")
         self.path.mkdir(parents=True, exist_ok=True)
         if not output.is_ours(self.path):
             manifest.write(self.path, manifest.Manifest())
@@ -114,7 +114,7 @@ class Store:
         except OutputError:
             raise
         except (OSError, ValueError, KeyError, ArrowException) as error:
-            raise OutputError(f"{self.path / PARTS / name} is no part of a sweep ({error}); remove it.") from None
+            raise OutputError(f"{self.path / PARTS / name} is not part of a sweep ({error}); remove it.") from None
 
 
 def _short(value: Any) -> str:

@@ -90,7 +90,7 @@ def _number(name: str, value: Any) -> float:
 
 def _differences(found: Mapping[str, float], stored: Mapping[str, float], rtol: float, atol: float) -> list[str]:
     told = [f"{name} is new: {found[name]:.9g}." for name in found if name not in stored]
-    told += [f"{name} is gone: it was {stored[name]:.9g}." for name in stored if name not in found]
+    told += [f"{name} is missing: it was {stored[name]:.9g}." for name in stored if name not in found]
     for name in found.keys() & stored.keys():
         a, b = found[name], stored[name]
         same = a == b or (math.isnan(a) and math.isnan(b)) or abs(a - b) <= atol + rtol * abs(b)

@@ -114,7 +114,7 @@ def _check(run: Trajectory, truth: Trajectory, of: Sequence[str]) -> None:
 
 def _unfinished(run: Trajectory, truth: Trajectory) -> list[str]:
     """What keeps two motions from being compared at all."""
-    for who, one in (("The run", run), ("What it is held against", truth)):
+    for who, one in (("The run", run), ("The motion to compare with", truth)):
         if not one.outcome.ok:
             text = " ".join(x for x in (one.message, one.outcome.advice) if x)
             return [f"{who} ended at t = {one.t[-1]:.9g} s with {one.outcome.value}: {text}"]
@@ -185,7 +185,7 @@ def _account(run: Trajectory) -> Floats:
     if run.ledger is None:
         raise InvalidValue(
             "The run keeps no energy account: prepare it with ledger=True where the engine "
-            "has that setting, or hold it against its start with conserved=True."
+            "has that setting, or compare it with its start with conserved=True."
         )
     book: Floats = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
     brought: Floats = book - book[0]

@@ -35,11 +35,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     for option, text, word in (
         ("case", case, "CASE[:VARIANT]"),
         ("engine", engine, "E[:PROFILE]"),
-        ("audit", "a robot file that every engine's own reader is to read alike; repeatable", "FILE"),
+        ("audit", "a robot file that every engine's own reader must read alike; repeatable", "FILE"),
     ):
         group.addoption(f"--crossbody-{option}", action="append", default=[], metavar=word, help=text)
         parser.addini(f"crossbody_{option}s", f"where --crossbody-{option} is not given: {text}", type="linelist")
-    plugin = "a Python file that is an engine, a metric, a case, ...; repeatable, beside [tool.crossbody] plugins"
+    plugin = (
+        "a Python file that is an engine, a metric, a case, ...; repeatable, in addition to [tool.crossbody] plugins"
+    )
     group.addoption("--crossbody-plugin", action="append", default=[], metavar="FILE", help=plugin)
     group.addoption("--crossbody-update", action="store_true", help="write baselines instead of comparing with them")
 

@@ -100,13 +100,13 @@ def test_other_mechanisms_have_no_pattern(metric: str) -> None:
 
 def test_a_metric_of_a_case_has_a_name_of_its_own() -> None:
     case = load("newtons_cradle")
-    with pytest.raises(InvalidValue, match=r"metrics position have the names of metrics that every case has"):
+    with pytest.raises(InvalidValue, match=r"metrics position have the same names as metrics of all cases"):
         metrics.of(replace(case, metrics={"position": case.metrics["balls_out"]}))
 
 
 @pytest.mark.parametrize("given", [{}, {"number": len, "signal": len}])
 def test_a_metric_of_a_case_is_one_function(given: dict[str, Any]) -> None:
-    with pytest.raises(InvalidValue, match="has one of number, signal and instants"):
+    with pytest.raises(InvalidValue, match="has exactly one of number, signal and instants"):
         CaseMetric(doc="", **given)
 
 

@@ -68,7 +68,7 @@ def test_a_file_of_ones_own_is_a_suite(path: str) -> None:
     assert [family.variant for family in suite.families] == ["short", "long"]
     assert dict(suite.families[0].axes) == {"length": Linear(0.1, 1.0), "mass": Linear(1.0, 4.0)}
     assert "mass" not in suites.load(path, {"mass": 1.0}).families[0].axes
-    with pytest.raises(InvalidValue, match="'balls' has parameters of its own: mass cannot be given"):
+    with pytest.raises(InvalidValue, match="'balls' has fixed parameters: mass cannot be given"):
         suites.load("balls", {"mass": 1.0})
 
 
@@ -124,7 +124,7 @@ def test_a_filter_alone_has_a_time_constant(activation: str, time_constant: floa
     if given_one == (activation == "filter") and math.isfinite(time_constant):
         assert Actuator(**given).time_constant == time_constant
     else:
-        with pytest.raises(SceneError, match=r"a filter alone has one, above 0 s|it must be finite"):
+        with pytest.raises(SceneError, match=r"only a filter has one, above 0 s|it must be finite"):
             Actuator(**given)
 
 

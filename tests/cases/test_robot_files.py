@@ -629,9 +629,10 @@ def test_inertia_of_an_actuator_on_a_tendon_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("body2 1 2 3 .1", "is no push"), ("body2 1 2 nan 0 1", "is no push"), ("body2 1 2 3 .2 .1", "is no push"),
-        ("body2 1 2 3 -1 1", "is no push"), ("leg 1 2 3 0 1", "no body 'leg'; valid: "),
-        ("body2 a b c d e", "is no push"), ("1", "is no push"),
+        ("body2 1 2 3 .1", "is not a push"), ("body2 1 2 nan 0 1", "is not a push"),
+        ("body2 1 2 3 .2 .1", "is not a push"),
+        ("body2 1 2 3 -1 1", "is not a push"), ("leg 1 2 3 0 1", "no body 'leg'; valid: "),
+        ("body2 a b c d e", "is not a push"), ("1", "is not a push"),
     ],
 )  # fmt: skip
 def test_wrong_pushes_are_refused(tmp_path: Path, text: str, said: str) -> None:
@@ -889,7 +890,7 @@ def test_an_inertia_that_no_body_has_is_the_same_in_pinocchio(tmp_path: Path) ->
     [
         ('value="1.3"', 'value="heavy"', "upper.*heavy"),
         ('xyz="0 .1 -.2"', 'xyz="0 .1"', "three numbers"),
-        ("</robot>", "", "no XML"),
+        ("</robot>", "", "not XML"),
         ("robot", "model", "<model>|compiler refuses"),
         (
             '<dynamics damping=".2"/>',

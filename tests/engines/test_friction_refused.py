@@ -40,7 +40,7 @@ def two(first: str, second: str, **change: Any) -> Scene:
 @pytest.mark.parametrize(("first", "second"), [("box", "box"), ("capsule", "cylinder"), ("capsule", "box")])
 def test_pairs_of_shapes_without_rows_are_refused(first: str, second: str) -> None:
     with pytest.raises(
-        SceneError, match=r"(?s)'a:b' of a \w+ and a \w+ has no rows: their gap is not known\. Valid are"
+        SceneError, match=r"(?s)'a:b' of a \w+ and a \w+ has no rows: their gap is not implemented\. Valid are"
     ):
         case_of(two(first, second))
 
@@ -170,8 +170,8 @@ def test_a_file_whose_friction_is_not_known_ends_where_it_would_act(tmp_path: Pa
     run = engines.load("reference").prepare(cases.from_file(str(path), friction=1, t_end=0.2), "compiled").run()
     assert run.outcome is Outcome.INCONSISTENT
     assert (
-        "friction that spins or rolls is not done (dimension=6, condim in a file; 3, or without=rolling" in run.message
-    )
+        "torsional and rolling friction are not supported (dimension=6, condim in a file; 3, or without=rolling"
+    ) in run.message
     assert "without=friction" in run.message
 
 

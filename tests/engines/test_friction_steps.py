@@ -89,6 +89,37 @@ def test_drakes_approximations_creep_as_they_are_written(mu: float, stiction: fl
     assert found.v[-1, 0] == pytest.approx(expected[approximation], rel=NEAR)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_a_sphere_is_caught_in_the_step_whose_middle_is_below_the_floor_and_comes_back_by_its_restitution(
+    seed: int,
+) -> None:
+    """Neither a step before nor behind; and what parts already, but is pressed back, comes to rest."""
+    rng, dt, e, radius = np.random.default_rng(seed), 1e-3, 0.5, 0.1
+    scene, turned = sphere_on_floor(0.3, radius), [1.0, 0.0, 0.0, 0.0]
+
+    def steps(gap: float, speed: float, t_end: float) -> Trajectory:
+        case = cases.from_scene(scene, q0=[0.0, 0.0, radius + gap, *turned], v0=[0, 0, speed, 0, 0, 0], t_end=t_end)
+        return ran("pinocchio", "admm", case, dt=dt, restitution=e)
+
+    found = steps(rng.uniform(0.01, 0.02), -rng.uniform(0.5, 2.0), 0.04)
+    k = int(np.flatnonzero(found.lam[:, 0])[0])  # of the step before
+    ahead = found.q[:, 2] - radius + 0.5 * dt * found.v[:, 2]
+    assert (ahead[: k - 1] > 0.0).all()
+    assert ahead[k - 1] <= 0.0
+    assert found.v[k, 2] == pytest.approx(-e * found.v[k - 1, 2], rel=1e-6)
+    assert steps(-1e-4, rng.uniform(0.1, 0.9) * G * dt, dt).v[-1, 2] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("e", [0.2, 0.6, 0.9])
+@pytest.mark.parametrize(("name", "profile"), [("pinocchio", "admm"), ("dart", "matched")])
+def test_a_sphere_comes_back_by_the_restitution_that_was_asked_for(name: str, profile: str, e: float) -> None:
+    scene, speed = sphere_on_floor(0.3, 0.1), -3.0
+    case = cases.from_scene(scene, q0=[0, 0, 0.11, 1.0, 0, 0, 0], v0=[0, 0, speed, 0, 0, 0], t_end=0.02)
+    found = ran(name, profile, case, dt=1e-4, restitution=e).v[:, 2]
+    k = int(np.argmax(found > 0.0))
+    assert found[k] == pytest.approx(-e * found[:k].min(), rel=2e-3)
+
+
 @pytest.mark.parametrize("dt", [2e-3, 5e-4])
 def test_darts_creep_grows_with_its_step(dt: float) -> None:
     case = cases.load("sliding_block", "rests", t_end=0.1)
@@ -134,7 +165,7 @@ def test_multipliers_explain_the_motion(name: str, profile: str, thrown: Case) -
     if (name, profile) == ("drake", "default") and len(thrown.contacts) > 3:
         return
     if (name == "dart") and (why := engine(name).why_not(thrown, profile)):
-        assert "cylinder" in why or "FCL's detector takes the capsule" in why
+        assert "cylinder" in why or "FCL's detector treats the capsule" in why
         return
     found = ran(name, profile, thrown, dt=1e-4)
     system, worst, largest = system_of(thrown), 0.0, 0.0

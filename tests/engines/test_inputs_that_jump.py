@@ -9,6 +9,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, EngineUnavailable
+from crossbody.engines._formed import form_of
 from crossbody.reports import metrics
 from crossbody.reports.measuring.truth import from_run
 
@@ -43,3 +44,15 @@ def test_every_mode_is_left_by_an_event(name: str, seed: int, tmp_path: Path) ->
         assert metrics.load("mode_residual").measure(truth, run, case) in (None, 0.0), profile
         if (run.mode >= 0).all() and run.events:
             assert len(run.events) > 4, profile
+
+
+@pytest.mark.parametrize(("name", "profile"), [("mujoco", "matched"), ("mujoco", "default"), ("pinocchio", "law")])
+def test_no_step_crosses_an_instant_at_which_a_force_is_not_smooth(name: str, profile: str) -> None:
+    """Across it a method has order 2 at most, which the errors of such a motion do not tell from its own."""
+    case = cases.load("soft_contact", close_start=0.10037, close_end=0.70071, t_end=0.8)
+    form = form_of(case)
+    assert form is not None
+    assert form.case.force is not None
+    kinks = form.case.force.breaks
+    assert len(kinks) == 2
+    assert np.isin(kinks, engines.load(name).prepare(case, profile).run().t).all()

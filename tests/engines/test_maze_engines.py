@@ -261,7 +261,7 @@ def test_parity_audit(variant):
 
 @pytest.mark.parametrize(("engine", "profile"), [PINOCCHIO, ("mujoco", "default")])
 def test_sampled_controller_is_declined_with_a_sentence(engine, profile):
-    with pytest.raises(CaseUnsupported, match="sampled controller runs in the reference alone"):
+    with pytest.raises(CaseUnsupported, match="only the reference runs a sampled controller"):
         load_engine(engine).prepare(load("ball_maze", variant="solve", controller="sampled"), profile)
 
 

@@ -81,7 +81,7 @@ def test_friction_is_a_reason_where_the_contact_has_it(seed: int, tmp_path: Path
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     dim = int(data.contact.dim[0])
-    rolls = "spins or rolls" if dim > 3 else ""
+    rolls = "torsional and rolling" if dim > 3 else ""
     for friction, told in ((0, rolls or ("friction is left out" if dim > 1 else "")), (1, rolls)):
         scene = cases.from_file(str(path), friction=friction).scene
         assert scene is not None

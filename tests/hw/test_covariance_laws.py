@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, toeplitz
 
-from crossbody.hw.fitting.covariance import Layout, noise_correlation, scatter
+from crossbody.hw.fitting.covariance import Layout, _contributions, noise_correlation, scatter
 from crossbody.hw.fitting.doubts import agreement
 
 LAYOUTS = (
@@ -32,6 +32,18 @@ def lengths(layout: Layout) -> list[int]:
 def correlated(layout: Layout, rho: float) -> np.ndarray:
     """V_ij = rho^|i - j| within each channel of each window (N, N)."""
     return block_diag(*(toeplitz(rho ** np.arange(m)) for m in lengths(layout)))
+
+
+@pytest.mark.parametrize("layout", LAYOUTS, ids=str)
+def test_contributions_are_independent_and_as_large_as_each_other(layout: Layout) -> None:
+    """Of steady weights, window by window: what one says of white noise no other does, so that they count as many."""
+    parts = _contributions(np.ones(layout.k * sum(layout.samples)), layout)
+    total = float(layout.k * sum(layout.samples))
+    each = parts.shape[1] // (1 if layout.overlap else len(layout.samples))
+    if layout.overlap:  # half a wave is at least as long as windows have samples in common
+        assert each * (layout.overlap + 1) <= len(layout.samples)
+    own = np.full(each, total) if layout.overlap else np.repeat(layout.k * np.array(layout.samples, dtype=float), each)
+    np.testing.assert_allclose(parts.T @ parts, np.diag(own / each), atol=1e-9 * total)
 
 
 @pytest.mark.parametrize("seed", range(4))

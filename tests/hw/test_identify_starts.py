@@ -55,14 +55,14 @@ def test_default_intervals_are_not_biased_by_the_noise_of_starts() -> None:
         assert abs(z.mean()) < 2.5 / np.sqrt(len(z))  # of a mean of unit normals: 1 in 80
         assert np.abs(z).max() < 4.0
     assert all(e.identifiable for fit in found for e in fit.estimates)
-    assert not any("start as measured" in warning for fit in found for warning in fit.warnings)
+    assert not any("start from measured states" in warning for fit in found for warning in fit.warnings)
 
 
 def test_measured_starts_that_are_wrong_are_found_out() -> None:
     fit = fitted(swing(0), starts="measured")
     assert not fit["I1"].identifiable
     assert any("I1 is not identifiable: its interval" in warning for warning in fit.warnings)
-    assert any("no interval counts the noise of a start" in warning for warning in fit.warnings)
+    assert any("whose noise the intervals do not include" in warning for warning in fit.warnings)
 
 
 def test_a_step_from_measured_starts_is_one_of_all_unknowns() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -103,6 +103,19 @@ def test_a_fit_is_linear_least_squares(seed: int) -> None:
     np.testing.assert_allclose(fit.correlation, cov / np.outer(std, std), atol=1e-6)
     assert (fit.kept, fit.unseen, fit.fitted, fit.held, fit.evaluations) == ((), (), (0, 2, 3, 5), (1, 4), 7)
     assert "3.0e-09" in fit.sensitivities
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize(("far", "told"), [(1.1, True), (0.9, False)])
+def test_what_reaches_a_bound_is_not_identifiable(side: int, far: float, told: bool) -> None:
+    search = drawn(0)[0]
+    free = judged(search).estimates
+    limits = tuple(np.array(limit) for limit in search.limits)
+    for i, one in enumerate(free):
+        limits[side][i] = one.value + far * ((one.low, one.high)[side] - one.value)
+    fit = judged(replace(search, limits=limits))
+    assert [one.identifiable for one in fit.estimates] == [told] * len(free)
+    assert ("cannot be distinguished from its bound" in " ".join(fit.warnings)) != told
 
 
 @pytest.mark.parametrize("alike", [2.0, -2.0, 0.0])

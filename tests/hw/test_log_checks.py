@@ -297,7 +297,7 @@ def test_duplicates_are_dropped_when_asked(tmp_path: Path) -> None:
     order = np.sort(np.append(np.arange(2000), [700, 700, 1900]))
     data = {name: values[order] for name, values in motion().items()}
     path = parquet(tmp_path / "log.parquet", data)
-    with pytest.raises(LogFormatError, match="stands still") as error:
+    with pytest.raises(LogFormatError, match="does not advance") as error:
         hw.read(path, columns())
     assert error.value.row == 701
     log = hw.read(path, columns(), repair=("drop_duplicates",))

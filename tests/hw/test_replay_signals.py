@@ -247,10 +247,10 @@ def test_inputs_that_no_motion_tells_are_named(seed: int, k: int, m: int) -> Non
         assert conditions(t, B, rows, names, "arm").shape == (6,)
         if m > 1:
             B[2, :, 1] = -2.0 * B[2, :, 0]
-            with pytest.raises(SceneError, match=r"first at t = 2 s, condition .* cannot tell u0 from u1 "):
+            with pytest.raises(SceneError, match=r"first at t = 2 s, condition .* cannot distinguish u0 from u1 "):
                 conditions(t, B, rows, names, "arm")
         return
-    with pytest.raises(SceneError, match="cannot tell|does nothing" if m > k else "no input balances"):
+    with pytest.raises(SceneError, match="cannot distinguish|does nothing" if m > k else "no input balances"):
         conditions(t, B, rows, names, "arm")
 
 

@@ -12,6 +12,7 @@ from rig_data import channels, log_of
 from crossbody import hw
 from crossbody.cases import SceneError
 from crossbody.hw.replaying.replay import _shortened
+from crossbody.hw.windows import rates
 from crossbody.hw.windows.rates import derivatives, rates_by_fit
 from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way
 from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
@@ -114,6 +115,19 @@ def test_polynomials_are_their_own_value_rate_and_acceleration(half: int, degree
         weights = np.linalg.pinv(np.vander(near / STEP, degree + 1, increasing=True))
         sizes = np.linalg.norm(weights, axis=1)
         assert gain[row] == pytest.approx([sizes[0], sizes[1] / STEP, 2.0 * sizes[2] / STEP**2], rel=1e-6)
+
+
+@pytest.mark.parametrize(("width", "degree"), rates.WIDTHS)
+def test_noise_alone_refuses_a_stretch_as_often_as_is_said(
+    width: int, degree: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a polynomial leaves of it has as many degrees of freedom as samples, less its coefficients."""
+    monkeypatch.setattr(rates, "LEVEL", 0.2)
+    monkeypatch.setattr(rates, "WORST", np.inf)
+    t, rows = STEP * np.arange(4000 * width), width * np.arange(4000)
+    noise = 0.3 * np.random.default_rng(width).normal(size=(len(t), 1))
+    off = rates._fitted(t, noise, rows, width, degree, 0, np.array([0.3]))[1]
+    assert np.mean(off > 1.0) == pytest.approx(0.2, abs=0.026)  # four standard deviations
 
 
 @pytest.mark.parametrize("seed", range(8))

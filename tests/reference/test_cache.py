@@ -512,7 +512,7 @@ def test_where_nothing_can_be_kept_the_command_says_so(tmp_path, monkeypatch, ca
         told = capsys.readouterr()
         assert json.loads(told.out) == {"folder": shown, "usable": False, "files": 0, "bytes": 0}
         assert end.value.code == 0
-        assert f"({why}); every process compiles anew. Set CROSSBODY_CACHE to another folder." in told.err
+        assert f"({why}); every process compiles again. Set CROSSBODY_CACHE to another folder." in told.err
 
 
 def test_a_folder_in_place_of_a_file_is_told_and_written_over(folder, capsys):

@@ -323,7 +323,7 @@ def test_a_missing_mesh_is_left_out_where_it_is_only_drawn(
         return
     case = cases.load(str(path), t_end=0.1)
     (told,) = case.findings
-    assert re.fullmatch(r"Mesh 'shell' is only drawn, and left out: there is no file .*parts.shell\.stl\.", told)
+    assert re.fullmatch(r"Mesh 'shell' is purely visual, and left out: there is no file .*parts.shell\.stl\.", told)
     for engine, profile in (("reference", "compiled"), ("mujoco", "as_is")):
         assert engines.load(engine).prepare(case, profile).run().outcome is Outcome.FINISHED
 
@@ -381,11 +381,11 @@ COLLADA = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11
 
 @pytest.mark.parametrize(
     ("corners", "told"),
-    [(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "3 corners that lie in a plane"),
-     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1e-9)), "4 corners that lie in a plane"),
+    [(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "3 corners that lie in one plane"),
+     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1e-9)), "4 corners that lie in one plane"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.inf)), "must be finite"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.nan)), "corner 3 is .* must be 3 numbers"),
-     (((0.0, 0.0), (1.0, 0.0)), "corner 0 is .* must be 3 numbers"), ((), "a hull alone has them")],
+     (((0.0, 0.0), (1.0, 0.0)), "corner 0 is .* must be 3 numbers"), ((), "only a hull has any")],
 )  # fmt: skip
 def test_a_hull_that_is_none_is_refused(corners: Any, told: str) -> None:
     with pytest.raises(SceneError, match=told):
@@ -393,7 +393,7 @@ def test_a_hull_that_is_none_is_refused(corners: Any, told: str) -> None:
 
 
 def test_corners_of_another_shape_are_refused() -> None:
-    with pytest.raises(SceneError, match="a hull alone has them"):
+    with pytest.raises(SceneError, match="only a hull has any"):
         Shape(name="box", type="box", size=(1.0, 1.0, 1.0), corners=((0.0, 0.0, 0.0),) * 4)
 
 

@@ -168,7 +168,7 @@ def rate_of_left(found: Trajectory, at: int) -> float:
         ({"gravity": 0.0}, InvalidValue, "gravity"), ({"drop": -0.01}, InvalidValue, "drop"),
         ({"b0": 1.0}, SceneError, "faster than those of CONTACT"), ({"a0": 1e7}, SceneError, "faster"),
         ({"slab_height": 0.1}, SceneError, "left corner starts"), ({"x": 0.35}, SceneError, "slab_half_length"),
-        ({"wall": 0.05}, SceneError, "deep in the wall"), ({"half_width": float("nan")}, InvalidValue, "half_width"),
+        ({"wall": 0.05}, SceneError, "inside the wall"), ({"half_width": float("nan")}, InvalidValue, "half_width"),
     ],
 )  # fmt: skip
 def test_contradictory_numbers_are_told_in_one_sentence(

@@ -39,6 +39,18 @@ def states():
     return list(zip(rng.normal(size=(10, 8)), rng.normal(size=(10, 8)), rng.normal(size=(10, 1)), strict=True))
 
 
+@pytest.mark.parametrize(("kp", "ks"), [(1e3, 10.0), (5e4, 300.0)])
+@pytest.mark.parametrize("variant", ["axis", "delta"])
+def test_a_sensor_is_measured_by_the_momentum_that_its_lag_keeps_back(variant, kp, ks):
+    """Of the least force that it feels, a part of what squeezes; stiffer fingers do not make it smaller."""
+    case = cases.load("soft_contact", variant, kp=kp, ks=ks)
+    sensors = [one for one in case.coordinates if one.unit == "N s"]
+    assert sensors
+    for one in sensors:
+        assert one.rate == pytest.approx(0.05 * kp * case.parameters["squeeze"])
+        assert one.size == pytest.approx(one.rate / ks)
+
+
 def test_rows_are_the_derivatives_of_the_gaps(states):
     case = cases.load("soft_contact")
     system = mechanism.build(case.parameters, case.law)

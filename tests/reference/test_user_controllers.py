@@ -462,7 +462,7 @@ def test_a_file_takes_a_control_from_python_or_by_name(files: Path) -> None:
 
     given = run_in(cases.from_file("arm.xml", control=Control(held, 0.02), t_end=0.2), "mujoco", "as_is")
     assert calls == [k * 0.02 for k in range(10)]
-    with pytest.raises(InvalidValue, match="tick is given beside a Control"):
+    with pytest.raises(InvalidValue, match="tick is given together with a Control"):
         cases.from_file("arm.xml", control=Control(held, 0.02), tick=0.01)
     with pytest.raises(InvalidValue, match=r"from_file\.control"):
         cases.from_file("arm.xml", control=held)

@@ -292,6 +292,20 @@ def test_a_symmetric_robot_is_seen_and_reached_from_one_motor():
     assert controllable(axis.model.pick(None, ["u[0]"])) == 4  # both lateral modes are equal on the axis: one is not
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_participation_is_how_poles_move_with_the_entries_of_the_diagonal(seed):
+    n, step = 5, 1e-6
+    A = np.random.default_rng(seed).normal(size=(n, n))
+    found = modes(model(A, np.ones((n, 1)), np.eye(n)))
+    slopes = np.empty((n, n))
+    for k in range(n):
+        up, down = (np.linalg.eigvals(A + sign * step * np.outer(np.eye(n)[k], np.eye(n)[k])) for sign in (1.0, -1.0))
+        for i, pole in enumerate(found.poles):
+            near = [poles[np.argmin(np.abs(poles - pole))] for poles in (up, down)]
+            slopes[k, i] = abs(near[0] - near[1]) / (2.0 * step)
+    np.testing.assert_allclose(found.participation, slopes / slopes.sum(axis=0), atol=1e-6)
+
+
 def test_participation_adds_up_and_names_the_mode():
     found = modes(model([[0.0, 1.0, 0.0], [-4.0, -0.4, 0.0], [0.0, 0.0, -3.0]], np.ones((3, 1)), np.eye(3)))
     np.testing.assert_allclose(found.participation.sum(axis=0), 1.0)

@@ -145,7 +145,7 @@ def test_baselines_hold_every_number_and_name_what_moved(tmp_path: Path) -> None
     first = str(told.value).splitlines()
     assert first[:-1] == [
         "drift was 1e-07 and is 2e-07, a difference of 1e-07.",
-        "far is gone: it was -inf.",
+        "far is missing: it was -inf.",
         "new is new: 3.",
         "none was nan and is 1, a difference of nan.",
     ]

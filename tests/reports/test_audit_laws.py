@@ -292,7 +292,7 @@ def test_a_version_that_was_not_tried_is_told() -> None:
     class Module:
         PACKAGE, TRIED = "numpy", ("0.1", "0.2")
 
-    assert "was tried with 0.1 to 0.2" in tried(Module)
+    assert "was tested with 0.1 to 0.2" in tried(Module)
     Module.TRIED = ("0.1", "99.0")
     assert tried(Module) == ""
 
@@ -354,7 +354,7 @@ def test_every_importer_says_what_it_was_tried_with() -> None:
 PLAIN = [
     feature for feature in FEATURES
     if feature.format == "mjcf" and not feature.files and {j.type for j in feature.scene.joints} <= {"hinge", "slide"}
-    and "actuators take off" not in feature.name
+    and "compensation by actuators" not in feature.name
 ]  # fmt: skip
 
 
@@ -452,7 +452,7 @@ def test_rounding_of_weights_far_out_is_no_difference(seed: int, tmp_path: Path)
 
 
 DECLARED = [
-    ("weight that is taken off", "a.xml:{}: The attribute 'gravcomp' found in a 'body' tag is unsupported.",
+    ("gravity compensation", "a.xml:{}: The attribute 'gravcomp' found in a 'body' tag is unsupported.",
      {"gravity", "bias"}),
     ("gravity switched off", "a.xml:{}: The tag 'flag' found as a child of 'option' is currently unsupported.",
      {"gravity", "bias", "energy"}),

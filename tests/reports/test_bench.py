@@ -260,7 +260,7 @@ def test_the_ratio_at_an_error_is_to_the_cheapest_run_of_the_reference_that_is_n
 def test_an_engine_with_other_events_reaches_no_error() -> None:
     rows = table(("reference", 1e-4, 1e-5, 1.0), ("other", 1e-3, np.inf, 1.0), ("other", 1e-6, np.inf, 1.0))
     says = headline(rows.assign(touches=[0.0, 5.0, 2.0]))["says"][0]
-    assert says == "reaches no error: at rtol = 1e-06 it touches +2 times beside the truth"
+    assert says == "reaches no error: at rtol = 1e-06 its touches differ from the truth's by +2"
 
 
 def test_errors_below_what_the_truth_is_known_to_are_alike() -> None:
@@ -331,8 +331,8 @@ def test_pairs_beside_which_two_cores_were_given_come_first() -> None:
     ("arguments", "words"),
     [
         (["--against", "nowhere"], "not a folder"),
-        (["--skip", "bouncing_ball"], "scenes of its own"),
-        (["-e", "dart", "delta_impulse", "--variant", "light"], "No engine asked for can run"),
+        (["--skip", "bouncing_ball"], "its own scenes"),
+        (["-e", "dart", "delta_impulse", "--variant", "light"], "None of the selected engines can run"),
         (["--repeats", "0"], "0 is not in the range"),
         (["no_such_case"], "no case"),
     ],

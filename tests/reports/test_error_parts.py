@@ -22,7 +22,17 @@ from crossbody.engines.mujoco._build import MAX_IMPEDANCE, without_regularisatio
 from crossbody.reports import metrics
 from crossbody.reports.judging import comparison
 from crossbody.reports.judging.comparison import Entry, judged
-from crossbody.reports.judging.parts import Events, NotMeasuredError, Positions, Split, Study, observed, splits
+from crossbody.reports.judging.parts import (
+    LEAST_RATIO,
+    Events,
+    NotMeasuredError,
+    Positions,
+    Split,
+    Study,
+    extrapolated,
+    observed,
+    splits,
+)
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, from_run
@@ -151,6 +161,15 @@ def test_a_limit_is_known_to_what_it_is_off_by(case: Case) -> None:
             continue
         right = model * case.t_end**2
         assert abs(found.largest["model"] - right) <= found.known["model"] + 1e-4 * right
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_limit_of_a_power_of_the_step_is_exact(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    limit, power, ratio = rng.normal(size=(5, 2)), rng.normal(size=(5, 2)), rng.uniform(LEAST_RATIO, 20.0)
+    found, known = extrapolated([limit + ratio**k * power for k in (2, 1, 0)], ratio)
+    np.testing.assert_allclose(found, limit, rtol=0.0, atol=1e-11)
+    assert known < 1e-10
 
 
 def test_without_an_order_nothing_is_extrapolated(case: Case) -> None:
@@ -435,7 +454,7 @@ def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: p
     told.append(jobs.run_case(swing, [pick], truth=None).entries[0].study)
     assert [study is not None and len(study.runs) > 1 for study in told] == [True, False]
     assert told[1] is not None
-    assert "Runs with other dt that tell it would take about" in told[1].why
+    assert "The runs with other dt that are needed would take about" in told[1].why
 
 
 def test_a_study_has_as_many_steps_as_there_is_time_for(monkeypatch: pytest.MonkeyPatch) -> None:

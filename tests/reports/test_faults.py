@@ -353,5 +353,5 @@ def test_a_number_that_left_its_band_is_wrong_if_that_is_asked_for(recorded: Rec
 
 def test_samples_of_a_judged_run_are_not_the_callers_to_choose() -> None:
     """Too few would show neither its events nor its forces, and a right run would be outside."""
-    with pytest.raises(InvalidValue, match="leave samples out"):
+    with pytest.raises(InvalidValue, match="omit samples"):
         jobs.run_case(load("bouncing_ball", "resting"), choice.picks(["reference:compiled"]), settings={"samples": 201})

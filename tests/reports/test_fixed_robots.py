@@ -61,7 +61,7 @@ def test_what_is_not_rewritten_is_a_sentence_and_no_file(tmp_path: Path, capsys:
     with pytest.raises(SystemExit) as end:
         main(["audit", str(path), "-e", "mujoco", "--fix", str(path)])
     assert end.value.code == 2
-    assert "must be another file" in capsys.readouterr().err
+    assert "it must differ from" in capsys.readouterr().err
 
 
 PARTIAL = """<mujoco><default><geom contype="4" friction=".3 .01 .001" size=".1 .2 .3"/></default>

@@ -20,6 +20,7 @@ from crossbody.cases.scene import Body, Joint
 from crossbody.reference import simulate
 from crossbody.reports import metrics
 from crossbody.reports.measuring import friction
+from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.friction import rubbing
 from crossbody.reports.measuring.truth import Truth, from_run
 from crossbody.reports.metrics import law_residual
@@ -46,6 +47,35 @@ TRUTH = from_run(RUN, Tier.A, "itself")
 def measured(name: str, run: Trajectory = RUN, case: Case = CASE, truth: Truth = TRUTH) -> float | None:
     """Return one metric."""
     return metrics.load(name).measure(truth, run, case)
+
+
+@pytest.mark.parametrize("times", [0.97, 1.0, 1.04])
+def test_where_a_slip_stops_the_clock_is_the_truths(times: float) -> None:
+    """If it is asked for what lam jumps at, and only then."""
+    own = engines.load("reference").prepare(CASE, "compiled").run()
+    truth = from_run(own, Tier.A, "itself")
+    late = replace(own, t=times * own.t, events=tuple(replace(event, t=times * event.t) for event in own.events))
+    (mine,), (theirs,) = ([e.t for e in run.events if e.after == Mode.STICK] for run in (late, own))
+    asked, plain = (clock(truth, late, releases)[late.t == mine] for releases in (True, False))
+    assert asked == pytest.approx(theirs, abs=1e-12)
+    assert plain == pytest.approx(mine, abs=1e-12)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_pair_slides_where_any_of_its_places_does(which: int) -> None:
+    """As what turns about a corner; how far is told by the place that slips most."""
+    t, slip, none = np.linspace(0.0, 1.0, 101), np.zeros((101, 2, 2)), np.zeros((101, 2))
+    slip[20:60, which, 0] = 1e-3
+    events = [(0.0, 0, Mode.STICK), (0.0, 1, Mode.STICK), (0.2, which, Mode.SLIP), (0.6, which, Mode.STICK)]
+    run = Trajectory(
+        t=t, q=none, v=none, gap=none, lam=none, energy=none, mode=np.full((101, 2), int(Mode.STICK), np.int8),
+        events=tuple(Event(t=at, contact=i, before=Mode.FREE, after=after) for at, i, after in events), steps=100,
+    )  # fmt: skip
+    rubs = friction.Rubbing(
+        rows=np.arange(2), pair=np.zeros(2, dtype=np.intp), mu=np.ones(2), slip=slip, force=0.0 * slip,
+        normal=np.ones((101, 2)), dry=np.zeros(2, dtype=bool),
+    )  # fmt: skip
+    assert list(friction.changes(run, rubs)) == [(0, 0.2, True), (0, 0.6, False)]
 
 
 def pushed(change: Any) -> Trajectory:
@@ -83,6 +113,21 @@ def test_friction_beyond_its_bound_or_below_it_is_seen(factor: float) -> None:
     assert measured("friction_impulse", run) == pytest.approx(abs(factor - 1.0) * MU * G * STOP, rel=1e-2)
     lost = 0.5 * SPEED**2 * 2.0 / 7.0
     assert measured("friction_work", run) == pytest.approx(abs(factor - 1.0) * lost, rel=1e-2)
+
+
+def test_friction_is_held_against_its_own_bound_where_that_is_small() -> None:
+    """What a contact could bear at another time, or another contact bears, excuses nothing."""
+    lam, k = np.array(RUN.lam), int(np.flatnonzero(RUN.t > 0.5 * STOP)[0])
+    lam[k, 0] *= 0.25
+    assert measured("cone_violation", replace(RUN, lam=lam)) == pytest.approx(0.75, rel=1e-6)
+
+
+@pytest.mark.parametrize("row", [1, 2])
+def test_rows_of_friction_have_the_mode_of_their_contact(row: int) -> None:
+    mode = np.array(RUN.mode)
+    assert measured("mode_residual") == 0.0
+    mode[[7, 90], row] = Mode.FREE
+    assert measured("mode_residual", replace(RUN, mode=mode)) == 2.0
 
 
 @pytest.mark.parametrize("angle", [0.1, -0.4, np.pi])

@@ -71,7 +71,7 @@ def test_compiled_code_that_finds_no_room_is_told_and_not_believed(
             code_store._told.clear()
             with no_file_above(limit):
                 store.write("name", data)
-            assert "it serves this process alone" in capsys.readouterr().err
+            assert "it is used only by this process" in capsys.readouterr().err
             assert store.read("name") == kept
             assert names(tmp_path) == ([] if kept is None else [f"name{CODE}"])
     code_store._told.clear()

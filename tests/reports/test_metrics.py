@@ -13,7 +13,7 @@ from crossbody.cases import Case, Event, Ledger, Mode, Tier, Trajectory, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.truth import _agreement, truth_of
 from crossbody.reports.measuring import scale
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
@@ -82,6 +82,13 @@ def test_clock_puts_every_touch_on_the_truths(truth: Truth) -> None:
     for mine, theirs in zip(contacts(late), contacts(truth.trajectory), strict=True):
         assert mapped[late.t == mine.touch] == pytest.approx(theirs.touch, abs=1e-14)
     assert np.all(np.diff(mapped) >= 0)
+
+
+def test_sources_of_a_truth_agree_in_their_events_too(truth: Truth, case: Case) -> None:
+    """A late impact is laid on the other's before positions are compared."""
+    found = _agreement(truth, shifted(truth.trajectory, 2e-3), case)
+    assert found["event_times"] == pytest.approx(2e-3, rel=1e-6)
+    assert found["position"] < 2e-2
 
 
 def test_scaled_force_scales_the_impulse_error(truth: Truth, case: Case) -> None:
@@ -361,6 +368,16 @@ def test_what_touches_beside_another_is_known_as_positions_are(off: float, limit
     gap[run.t == touch, 1] += off
     found = measure("event_gap", from_run(run, Tier.A, "itself"), replace(run, gap=gap), case)
     assert (found == 0.0) if limit == 0.0 else (1e-6 < found < limit)
+
+
+def test_what_touches_alone_touches_at_its_surface(truth: Truth, case: Case) -> None:
+    """By less than positions are known to, where nothing was located beside it that it could have joined."""
+    run = truth.trajectory
+    touch = next(event.t for event in run.events if event.after == Mode.CONTACT)
+    gap = run.gap.copy()
+    gap[run.t == touch] += 5e-7
+    way = np.max(np.abs(np.diff(gap[:, 0])))
+    assert measure("event_gap", truth, replace(run, gap=gap), case) == pytest.approx(5e-7 / way, rel=1e-2)
 
 
 @pytest.mark.parametrize("level", [-3e6, 3e6])

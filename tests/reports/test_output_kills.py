@@ -135,7 +135,7 @@ def law_of_other_swaps(tmp_path: Path, stride: int) -> None:
         "first": (lambda place: place, lambda place: put(place, "new"), {}, dict.fromkeys(FILES["new"], "new")),
         "adds": (fresh, add, old, old | {"b.json": "new"}),
         "beside": (fresh, beside, old, old | {"bode.json": "new"}),
-        "in the way": (with_a_file_in_the_way, in_the_way, old | {"b.json": "by hand"}, old | kept),
+        "exists; move it": (with_a_file_in_the_way, in_the_way, old | {"b.json": "by hand"}, old | kept),
     }
     for name, (made, work, before, after) in laws.items():
         (tmp_path / name).mkdir()
@@ -144,7 +144,7 @@ def law_of_other_swaps(tmp_path: Path, stride: int) -> None:
         for place in everywhere(start, work, tmp_path / name, stride):
             recover(place)
             assert content(place) in ends, name
-            if name != "in the way":
+            if name != "exists; move it":
                 work(place)
                 assert content(place) == ends[1], name
         assert len(list((tmp_path / name).iterdir())) > 80 / stride
@@ -181,7 +181,7 @@ def test_what_a_killed_command_left_is_told(tmp_path: Path, capsys: pytest.Captu
     put(tmp_path / "out", "old")
     (tmp_path / "out" / ".crossbody-new.run.x").mkdir()
     check(tmp_path / "out", "run")
-    assert "half-written tables of an interrupted command are removed" in capsys.readouterr().err
+    assert "incomplete tables of an interrupted command have been removed" in capsys.readouterr().err
     assert content(tmp_path / "out") == dict.fromkeys(FILES["old"], "old")
 
 

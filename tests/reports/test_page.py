@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import subprocess
@@ -30,6 +31,7 @@ from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import KeptTemplates, Page, plot
+from crossbody.reports.pages.precision import scatter
 from crossbody.reports.runs import study
 from crossbody.reports.runs.files import file_name
 from crossbody.reports.runs.jobs import CaseResult
@@ -272,7 +274,7 @@ def test_the_index_says_which_engine_is_right(out: Path) -> None:
     assert "skipped" in (cells[1]["class"] or "")
     assert "within" in (cells[2]["class"] or ""), "the truth"
     assert "\u2717" in text
-    assert "made by crossbody 0.0.1" in text
+    assert "computed by crossbody 0.0.1" in text
 
 
 def test_difference_to_the_truth_is_what_was_put_in(out: Path) -> None:
@@ -342,7 +344,7 @@ def test_a_cell_is_the_warmer_the_farther_out(word: Word) -> None:
 
 
 def test_what_is_farthest_out_stands_first(out: Path) -> None:
-    text = (out / CASE).read_text()
+    text = (out / CASE).read_text().replace("<wbr>", "")
     body = text[text.index('--glance">') :]
     shown = re.findall(r'<th scope="row">(\w+)', body[body.index("<tbody>") : body.index("</tbody>")])
     rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["verdict"] in grid.WORST]
@@ -380,7 +382,7 @@ def test_a_study_of_another_version_is_told(tmp_path: Path, result: CaseResult) 
     assert (out / CASE).is_file()
 
 
-@pytest.mark.parametrize(("make", "says"), [(Path.mkdir, "was not written by crossbody"), (None, "holds no study")])
+@pytest.mark.parametrize(("make", "says"), [(Path.mkdir, "was not written by crossbody"), (None, "contains no study")])
 def test_a_folder_without_a_study_cannot_stand_beside(
     tmp_path: Path, result: CaseResult, make: Callable[[Path], None] | None, says: str
 ) -> None:
@@ -568,3 +570,28 @@ def test_a_template_is_compiled_once_and_again_when_it_changes(tmp_path, monkeyp
         changed.setattr(Environment, "compile", None)
         assert shown("{{ name }}") == first
     assert shown("{{ name | length }}") == "11"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_names_of_marks_of_one_height_do_not_all_stand_at_it(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    heights = 10.0 ** draw.uniform(-1.0, 3.0, draw.integers(1, 6))
+    close = 0.05 * (np.ptp(np.log10(heights)) + 1.0)
+    marks = [("e", 1.0, float(ms)) for ms in heights]
+    sides = [str(line["textposition"]).split()[0] for line in scatter(marks, {"e": 0})["data"]]
+    for i, j in itertools.pairwise(np.argsort(heights)):
+        low, high = sides[i], sides[j]
+        beside = np.log10(heights[j] / heights[i]) < close
+        assert (
+            (low in ("bottom", "middle") and high in ("middle", "top") and low != high) or not beside or len(marks) > 2
+        )
+        assert beside or (low != "bottom" and high != "top")
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_name_that_may_break_is_the_same_name(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    name = "".join(draw.choice(list("ab:_<>&'\"; #"), 12))
+    shown = html.breakable(name)
+    assert unescape(shown.replace("<wbr>", "")) == name
+    assert shown.count("<wbr>") == name.count(":") + name.count("_")

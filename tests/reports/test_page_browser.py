@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
@@ -79,6 +80,7 @@ DRAWN = "[...document.querySelectorAll('.plot')].filter((box) => 'drawn' in box.
 
 def draw_all(browser: chromium.Browser) -> None:
     browser.js("document.querySelectorAll('.fold').forEach((each) => { each.open = true; })")
+    browser.js("document.querySelectorAll('[data-of]').forEach((each) => { each.hidden = false; })")
     browser.js("document.querySelectorAll('.plot').forEach((box) => box.scrollIntoView())")
     browser.wait(
         "[...document.querySelectorAll('.plot')].every((box) => { if (!('drawn' in box.dataset)) box.scrollIntoView();"
@@ -485,7 +487,7 @@ def test_what_is_folded_is_drawn_when_it_is_asked_for(solids: Path, browser: chr
     browser.wait(f"getComputedStyle({fold}.querySelector('.cursor')).visibility === 'visible'")
     browser.js("dispatchEvent(new Event('beforeprint'))")
     assert browser.js("[...document.querySelectorAll('.fold')].every((each) => each.open)")
-    browser.wait("[...document.querySelectorAll('.plot')].every((box) => 'drawn' in box.dataset)")
+    browser.wait("[...document.querySelectorAll('.plot:not([hidden] *)')].every((box) => 'drawn' in box.dataset)")
     browser.js("dispatchEvent(new Event('afterprint'))")
     assert browser.js("[...document.querySelectorAll('.fold')].filter((each) => each.open).length") == 1
     assert browser.complaints() == []
@@ -514,3 +516,55 @@ def test_long_numbers_lie_over_nothing(tmp_path: Path, browser: chromium.Browser
     assert {
         width: found for width in (1400, 400) if (found := look(browser, tmp_path / "p.html", width, "light"))
     } == {}
+
+
+def test_one_contact_is_chosen_of_several_in_every_section(solids: Path, browser: chromium.Browser) -> None:
+    """Its figures are drawn when they are first seen, and again in their width after paper was."""
+    browser.open(solids)
+    boxes = "[...document.querySelectorAll('[data-of]:not([hidden]) .plot')]"
+    assert browser.js("document.querySelectorAll('[data-choice]').length") >= 1
+    options = browser.js("[...document.querySelector('[data-choice]').options].map((one) => one.value)")
+    assert len(options) > 1
+    assert browser.js(f"{boxes}.every((box) => box.closest('[data-of]').dataset.of === {json.dumps(options[0])})")
+    browser.js(
+        f"(() => {{ const select = document.querySelector('[data-choice]'); select.value = {json.dumps(options[1])};"
+        " select.dispatchEvent(new Event('change')); })()"
+    )
+    browser.js(f"{boxes}[0].scrollIntoView()")
+    browser.wait(f"{boxes}.some((box) => 'drawn' in box.dataset)")
+    found = browser.js(f"{boxes}.map((box) => box.closest('[data-of]').dataset.of)")
+    assert set(found) == {options[1]}
+    browser.js("dispatchEvent(new Event('beforeprint')); dispatchEvent(new Event('afterprint'))")
+    browser.js(
+        f"(() => {{ const select = document.querySelector('[data-choice]'); select.value = {json.dumps(options[0])};"
+        " select.dispatchEvent(new Event('change')); })()"
+    )
+    browser.js(f"{boxes}[0].scrollIntoView()")
+    browser.wait(f"{boxes}[0].querySelector('.main-svg')?.clientWidth === {boxes}[0].clientWidth")
+    assert browser.complaints() == []
+
+
+def test_one_goes_from_case_to_case_and_back_to_the_sections(tmp_path: Path, browser: chromium.Browser) -> None:
+    results = []
+    for variant in ("linear", "resting", "elastic"):
+        truth = truth_of(case := load("bouncing_ball", variant, t_end=0.5))
+        results.append(
+            CaseResult(case=case, truth=truth, entries=(Entry(engine="e", profile="p", run=truth.trajectory),))
+        )
+    with folder(tmp_path / "out") as made:
+        study.write(
+            made, results, study.judge(results, {one.case.label: "" for one in results}), {"command": "", "time": ""}
+        )
+        site.write(made)
+    browser.open(tmp_path / "out" / CASE)
+    for follow, expected in (('a[title="Next case"]', "resting"), ('a[title="Next case"]', "elastic")):
+        assert browser.js(f"document.querySelectorAll('.beside-page {follow}').length") == 1
+        browser.js(f"document.querySelector('.beside-page {follow}').click()")
+        browser.wait(
+            f"document.readyState === 'complete' && document.querySelector('h1').textContent.includes('{expected}')"
+        )
+    assert browser.js("document.querySelectorAll('.beside-page a').length") == 1
+    browser.js("scrollTo(0, document.documentElement.scrollHeight)")
+    browser.js("document.querySelector('.engines a').click()")
+    browser.wait("document.querySelector('.inside').getBoundingClientRect().top >= 0 && scrollY < 300")
+    assert browser.complaints() == []

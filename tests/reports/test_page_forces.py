@@ -78,6 +78,13 @@ def test_a_force_beyond_the_plot_is_named(run: Trajectory) -> None:
     assert shape["title"]["text"].endswith(f"Off scale: wild:p up to {100.0 * top:.3g} N (floor)")
 
 
+@pytest.mark.parametrize("times", [1.6, 3.9])
+def test_a_force_of_a_few_times_the_truths_is_drawn_whole(run: Trajectory, times: float) -> None:
+    drawn = force([trace(run), trace(replace(run, lam=times * run.lam), "strong")])
+    assert "Off scale" not in drawn["layout"]["title"]["text"]
+    assert "range" not in drawn["layout"]["yaxis"]
+
+
 def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> None:
     def wide(lam: Floats) -> Trace:
         doubled = {name: np.repeat(getattr(run, name), 2, axis=1) for name in ("gap", "mode")}
@@ -87,7 +94,7 @@ def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> Non
     bears, idles = wide(run.lam), wide(0.0 * run.lam)
     titles = [axis["title"]["text"] for key, axis in force([bears])["layout"].items() if key.startswith("yaxis")]
     assert [text.partition("<br>")[0] for text in titles] == ["lam floor", "impulse"]
-    assert note("force", [bears]).endswith("Without a force in every run: wall.")
+    assert note("force", [bears]).endswith("Without force in every run: wall.")
     assert (bool(plots("force", [bears])), bool(plots("force", [idles]))) == (True, False)
 
 
@@ -116,7 +123,7 @@ def test_of_many_rows_that_carry_nothing_a_few_are_named(run: Trajectory) -> Non
     rows = {name: np.repeat(getattr(run, name), 601, axis=1) for name in ("gap", "mode")}
     found = trace(replace(run, lam=np.c_[run.lam, np.zeros((len(run.t), 600))], ledger=None, **rows))
     told = note("force", [replace(found, about=found.about | {"contacts": names})])
-    assert told.endswith("Without a force in every run: pair 0, pair 1, pair 2, pair 3, pair 4, pair 5 and 594 more.")
+    assert told.endswith("Without force in every run: pair 0, pair 1, pair 2, pair 3, pair 4, pair 5 and 594 more.")
 
 
 def test_a_bound_of_an_angle_pushes_with_a_torque(tmp_path: Path) -> None:
@@ -145,6 +152,31 @@ def test_a_coordinate_that_only_rounding_moves_is_drawn_at_rest(run: Trajectory)
 
     assert drawn(1e-15)["range"] == pytest.approx([-1e-6, 1e-6], rel=1e-3)
     assert "range" not in drawn(1e-2)
+
+
+def test_the_floor_of_differences_is_that_of_the_largest_motion_of_any_run(run: Trajectory) -> None:
+    """A coordinate that the truth leaves at 1e-16 would have 16 decades more."""
+    still = trace(replace(run, q=1e-16 * run.q))
+    moved = replace(trace(run, "fake"), truth=still.run)
+    drawn = motion([still, moved])
+    least = min(float(np.nanmin(numbers(line["y"]))) for line in drawn["data"] if line.get("yaxis") == "y2")
+    assert 1e-17 <= least <= 1e-15
+
+
+def test_tangential_rows_of_named_contacts_are_not_named(run: Trajectory) -> None:
+    rows = {name: np.repeat(getattr(run, name), 7, axis=1) for name in ("gap", "mode")}
+    lam = np.c_[run.lam, np.zeros((len(run.t), 6))]
+    found = trace(replace(run, lam=lam, ledger=None, **rows))
+    names = ["floor", "a", "b", "a t1", "a t2", "b t1", "floor t1"]
+    found = replace(found, about=found.about | {"contacts": names}, truth=None)
+    assert note("force", [found]).endswith("Without force in every run: a, b, floor t1.")
+    assert note("modes", [found]).startswith("Alike: a, b as floor.")
+
+
+def test_an_engine_without_an_account_is_named(run: Trajectory) -> None:
+    told = note("energy", [trace(run), trace(replace(run, ledger=None), "fake")])
+    assert told.endswith("only their total energy is drawn: fake:p.")
+    assert note("energy", [trace(run)]) == ""
 
 
 def many(run: Trajectory, seed: int) -> list[Trace]:

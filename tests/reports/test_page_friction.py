@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from unpacked import numbers
@@ -56,7 +58,7 @@ def test_slip_on_a_belt_is_the_block_less_the_belt() -> None:
 
 def test_what_slides_is_on_the_edge_and_against_its_slip(trace: Trace) -> None:
     (section,) = friction([trace])
-    cone, plane, slips = (plot.figure for plot in section.plots)
+    cone, plane, slips = (plot.figure for plot in section.plots[:3])
     edge = cone["layout"]["shapes"][0]
     mu = edge["y1"] / edge["x1"]
     (line,) = cone["data"]
@@ -71,6 +73,23 @@ def test_what_slides_is_on_the_edge_and_against_its_slip(trace: Trace) -> None:
     if (trace.run.mode == Mode.SLIP).any() and fast.sum() > 3:
         against = np.sum(force * speed, axis=0)[fast] / np.linalg.norm(speed, axis=0)[fast]
         assert np.median(against) == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_one_contact_of_several_is_chosen_the_most_loaded_first() -> None:
+    """Each has its own figures, of the same kinds; together they have at most twice the points of one."""
+    case = load("sliding_block", "flat")
+    run = load_engine("reference").prepare(case, "compiled").run()
+    run = replace(run, lam=run.lam * np.linspace(1.0, 2.0, run.lam.shape[1]))
+    (section,) = friction([Trace(about=study._about(case, "reference", "compiled"), run=run)])
+    kinds = [[plot.name.split("-")[2] for plot in plots] for plots in section.choices.values()]
+    assert len(section.choices) == 4
+    assert kinds == [["cone", "plane", "slip"]] * 4
+    assert len({plot.name for plot in section.plots}) == len(section.plots)
+    loads = [float(np.nanmax(numbers(plots[0].figure["data"][0]["x"]))) for plots in section.choices.values()]
+    assert loads == sorted(loads, reverse=True)
+    for name, plots in section.choices.items():
+        assert name in case.contacts
+        assert all(name in plot.figure["layout"]["title"]["text"] for plot in plots)
 
 
 def test_without_friction_there_is_no_such_section() -> None:

@@ -228,7 +228,7 @@ def test_plug_ins_of_another_distribution_are_found_by_their_entry_points(
         def test_named(crossbody_verdicts):
             assert crossbody_verdicts["their_metric"].unit == "m"
             assert "their_format" in formats.names()
-            with pytest.raises(EngineUnavailable, match="pip install 'no_such_package' brings it"):
+            with pytest.raises(EngineUnavailable, match="install it with: pip install 'no_such_package'"):
                 engines.load("absent_engine")
         """
     )

@@ -55,10 +55,10 @@ def ended(*words: str) -> int:
         ("lacks.py", "cannot be imported: ModuleNotFoundError (No module named 'no_such_package')"),
         ("ends.py", "cannot be imported: SystemExit"),
         ("nothing.py", "defines none. Public names of a plug-in, by its kind: case: PARAMETERS, VARIANTS, build; "),
-        ("mujoco.py", "The engine 'mujoco' is there already: rename the plug-in "),
-        ("position.py", "The metric 'position' is there already: rename the plug-in "),
-        ("balls.py", "The suite 'balls' is there already: rename the plug-in "),
-        ("other/mine.py", "have one name: rename one of the files."),
+        ("mujoco.py", "The engine 'mujoco' already exists: rename the plug-in "),
+        ("position.py", "The metric 'position' already exists: rename the plug-in "),
+        ("balls.py", "The suite 'balls' already exists: rename the plug-in "),
+        ("other/mine.py", "have the same name: rename one of the files."),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("by", ["option", "configuration"])

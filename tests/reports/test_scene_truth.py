@@ -138,7 +138,7 @@ def test_the_horizon_is_the_first_reason_of_all(seed: int) -> None:
     if min(reasons) < 1.0:
         assert found is not None
         assert found.until == pytest.approx(min(reasons), abs=1e-12)
-        words = ("slide", "let", "neighbouring")
+        words = ("sliding", "opens", "neighbouring")
         assert words[np.argmin(reasons)] in found.why
     else:
         assert found is None
@@ -276,7 +276,9 @@ def test_a_motion_is_compared_up_to_where_the_law_has_none_further() -> None:
     assert 0.9 * whole.t[-1] < found.case.t_end < whole.t[-1]
     (row,) = truth_row(found.case, found.truth, "")
     assert row.verdict == Word.WITHIN
-    assert "(rigid bodies with dry friction have no motion beyond (Painleve))" in sentence(runs_of([row.row()]))
+    assert ("(rigid bodies with dry friction have no motion beyond this instant (Painleve))") in sentence(
+        runs_of([row.row()])
+    )
     ended = [entry.run.outcome for entry in found.entries if entry.run is not None]
     assert ended[0] is Outcome.FINISHED
 

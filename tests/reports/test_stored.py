@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, load
+from crossbody.cases import Case, load, names, variants
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import Entry
 
@@ -26,6 +27,13 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     stored._table.cache_clear()
     yield
     stored._table.cache_clear()
+
+
+@pytest.mark.parametrize("label", [f"{name}:{variant}" for name in names() for variant in variants(name)])
+def test_what_is_stored_goes_from_one_process_to_another(label: str) -> None:
+    """Not so its case, whose truth may be functions within others."""
+    laid = stored.laid(load(label), entry(("one", "a"), 1e-3), {"position": 0.1}, 0.5)
+    assert pickle.loads(pickle.dumps(laid)) == laid
 
 
 def entry(who: tuple[str, str], dt: float) -> Entry:
@@ -50,7 +58,7 @@ def test_a_table_of_runs_keeps_what_still_holds(seed: int) -> None:
                 if name not in known or known[name][0] != (t_end, end):
                     known[name] = (t_end, end), {}
                 known[name][1][ENGINES[k]] = dt, found
-        stored.write(runs)
+        stored.write(stored.laid(*run) for run in runs)
         for name, (case, until) in now.items():
             (t_end, end), held = known.get(name, ((math.nan, math.nan), {}))
             for who in ENGINES:

@@ -116,7 +116,7 @@ def test_wrong_use_is_one_sentence_and_changes_nothing(
 @pytest.mark.parametrize(
     ("axes", "says"),
     [
-        ("axes={'a0': Log(1.0, 2.0)}, grid={'a0': Levels((1.0,))}", "a0 is asked for twice"),
+        ("axes={'a0': Log(1.0, 2.0)}, grid={'a0': Levels((1.0,))}", "a0 is given twice"),
         ("axes={'a0': Log(2.0, 1.0)}", "its low end must be finite and below its high end"),
         ("grid={'a0': Levels(())}", "at least one value"),
         ("", "needs an axis, a grid or a ladder"),

@@ -40,10 +40,10 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("run folder.xml", "There is no robot file 'folder.xml': it is a folder, a pipe or a device."),
         ("audit arm", "There is no robot file 'arm'; valid: the path of a file."),
         ("audit arm.txt", "The robot file arm.txt ends in '.txt'; valid: .xml, .urdf."),
-        ("run arm.txt", "The case 'arm.txt' is no case file; the path of one ends in .py, .xml, .urdf."),
-        ("run arm.mjcf", "The case 'arm.mjcf' is no case file; the path of one ends in .py, .xml, .urdf."),
-        ("run ARM.XML", "The case 'ARM.XML' is no case file; the path of one ends in .py, .xml, .urdf."),
-        ("run below", "The case 'below' is no case file; the path of one ends in .py, .xml, .urdf."),
+        ("run arm.txt", "The case 'arm.txt' is not a case file; its path must end in .py, .xml, .urdf."),
+        ("run arm.mjcf", "The case 'arm.mjcf' is not a case file; its path must end in .py, .xml, .urdf."),
+        ("run ARM.XML", "The case 'ARM.XML' is not a case file; its path must end in .py, .xml, .urdf."),
+        ("run below", "The case 'below' is not a case file; its path must end in .py, .xml, .urdf."),
         ("run bouncing_ball.py", "There is no case file 'bouncing_ball.py'. Did you mean 'bouncing_ball'?"),
         ("run arm.xml --ctrl u.csv", "There is no table of controls 'u.csv'. Known: empty.csv."),
         ("run arm.xml --ctrl empty.csv", "Controls empty.csv: No columns to parse from file; valid: a table with "),
@@ -87,6 +87,4 @@ def test_in_a_folder_that_is_gone_what_needs_none_is_done_and_the_rest_is_told(
     with pytest.raises(SystemExit) as end:
         main(["run", "bouncing_ball", "--variant", "linear", "-e", "reference:compiled", "--out", "out"])
     assert end.value.code == 2
-    assert capsys.readouterr().err.endswith(
-        "crossbody: The folder that the command was given in has been removed; change to another one.\n"
-    )
+    assert capsys.readouterr().err.endswith("crossbody: The working folder has been removed; change to another one.\n")

@@ -89,7 +89,7 @@ def test_what_lacks_one_name_of_its_kind_is_told_which(
     told = sentence(capsys, "list", "--plugin", "mine.py")
     kind = KINDS[group]
     also = f"{name} ({kind.defines[name].valid})"
-    assert told.endswith(f"mine.py is no plug-in yet: a {kind.name} also defines {also}.\n")
+    assert told.endswith(f"mine.py is not yet a plug-in: a {kind.name} also defines {also}.\n")
 
 
 def test_a_case_file_is_checked_as_a_plug_in_is(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -158,7 +158,7 @@ def test_what_an_engine_returns_is_looked_at(
         ("rows=n", "rows=str(n)", "Group.rows is '50'; it must be a whole number from 0 on. It was raised in "),
         ("            yield {", "            yield 3, {", "with an array (n,) for each of t, angle."),
         ("self._arrays[name][s", "self._arrays[name][:, None][s", " is {'t': (50, 1), 'angle': (50, 1)}; valid: a"),
-        ("    return NpzReader", "    import no_such_x\n    return NpzReader", "pip install 'no_such_x' brings it."),
+        ("    return NpzReader", "    import no_such_x\n    return NpzReader", "it with: pip install 'no_such_x'"),
     ],
 )  # fmt: skip
 def test_what_a_log_format_returns_is_looked_at(

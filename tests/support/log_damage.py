@@ -89,8 +89,8 @@ def _without(name: str, data: dict[str, np.ndarray]) -> None:
 CONTENTS: dict[str, tuple[Callable[[dict[str, np.ndarray]], None], str, int | None]] = {
     "nan": (partial(_set, "angle", 37, np.nan), "not a finite number", 37),
     "inf": (partial(_set, "torque", 311, np.inf), "not a finite number", 311),
-    "back": (_back, "goes back", 200),
-    "still": (_still, "stands still", 120),
+    "back": (_back, "time decreases", 200),
+    "still": (_still, "does not advance", 120),
     "swapped": (partial(_swap, "angle", "torque"), "outside", 0),
     "swapped-rate": (partial(_swap, "angle", "rate"), "outside", None),
     "degrees": (partial(_scale, "angle", 180 / np.pi), "outside", None),
@@ -336,7 +336,7 @@ def _others() -> Iterator[Damage]:
     others: dict[str, tuple[str, Callable[[Path], Path], str]] = {
         "mat-objects": ("mat", _mat_objects, "MATLAB"),
         "mat-is-csv": ("mat", partial(_renamed, "csv", "log.mat"), "log.t"),
-        "hdf5-never-written": ("hdf5", _hdf_never_written, "cut off"),
+        "hdf5-never-written": ("hdf5", _hdf_never_written, "truncated"),
         "hdf5-elsewhere": ("hdf5", _hdf_elsewhere, "another file"),
         "hdf5-objects": ("hdf5", _hdf_objects, "not numbers"),
         "parquet-text": ("parquet", _parquet_text, "not numbers"),

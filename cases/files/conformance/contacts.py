@@ -20,12 +20,16 @@ from crossbody.cases.files.conformance.arm import (
 )
 from crossbody.cases.scene import Body, Joint, Loop, Pair, RowLaw, Scene, Shape
 
-FILTER = "Two shapes may touch where a bit of contype of the one is one of conaffinity of the other."
-MIXED = "Of two shapes the one of higher priority counts, else the larger friction and condim, and the sum of margins."
-SOFT = "solref is a time constant and a damping ratio, or with numbers below 0 a stiffness and a damping."
-MIXED_SOFT = "Softness of two shapes is a mean by solmix, or the lesser numbers where either says a stiffness."
+FILTER = "Two shapes may touch if contype of one and conaffinity of the other have a common bit."
+MIXED = (
+    "The shape of higher priority determines friction and condim; otherwise the larger values apply. Margins are added."
+)
+SOFT = "solref is a time constant and a damping ratio, or, if negative, a stiffness and a damping."
+MIXED_SOFT = (
+    "The softness of two shapes is a mean weighted by solmix, or the smaller numbers if either gives a stiffness."
+)
 SAFE = "A time constant is at least two time steps unless the flag refsafe is off."
-DIRECT = "Say it in the engine: what stands in solref, solimp and solmix is MuJoCo's own."
+DIRECT = "Set it in the engine: solref, solimp and solmix are specific to MuJoCo."
 STIFF_BY = 0.95  # the largest impedance that solimp has where it is not given
 SHAPES = {
     "floor": Shape(name="floor", type="plane", size=(1.0, 1.0, 0.1)),
@@ -83,7 +87,7 @@ def features() -> list[Feature]:
         return Feature(name, text, scene, finds, rule, rewrite, ("shapes", "contacts"))
 
     def rough(name: str, finds: str, text: str, pairs: tuple[Pair, ...], rule: str = MIXED) -> Feature:
-        return Feature(name, text, above(pairs=pairs), finds, rule, "Say friction in the engine.", ("surfaces",))
+        return Feature(name, text, above(pairs=pairs), finds, rule, "Set friction in the engine.", ("surfaces",))
 
     def soft(name: str, finds: str, law: RowLaw, rule: str = SOFT, head: str = "", **at: Any) -> Feature:
         pairs = (*meeting("floor:a", law=law), *meeting("floor:b"))
@@ -97,10 +101,10 @@ def features() -> list[Feature]:
                        DIRECT, ("softness",))  # fmt: skip
 
     step, unsafe = '<option timestep=".005"/>', '<option timestep=".005"><flag refsafe="disable"/></option>'
-    switched = "Rows that a flag switches off are not there."
+    switched = "Rows that a flag disables do not exist."
     return [
         filtered("shapes that may touch", ".//body/geom", touching(), above(pairs=meeting(*both)),
-            "Shapes of a body and of what it hangs on do not touch, but for the world's."),
+            "Shapes of a body and of its parent do not touch, unless the parent is the world."),
         filtered("bodies that are excluded", "contact/exclude",
             touching(wrist=True, tail='<contact><exclude body1="upper" body2="hand"/></contact>'),
             above("floor a b c", meeting(*hung), wrist=True), "Shapes of two bodies that are excluded do not touch.",
@@ -109,11 +113,11 @@ def features() -> list[Feature]:
             above("floor a b c", meeting(*hung, "a:c"), wrist=True)),
         filtered("parent and child that touch", "option/flag[@filterparent]",
             touching(head='<option><flag filterparent="disable"/></option>'),
-            above(pairs=meeting(*both, "a:b")), "With the flag filterparent off a body touches what it hangs on.",
+            above(pairs=meeting(*both, "a:b")), "With the flag filterparent off, a body touches its parent.",
             "Let them touch in the engine."),
         filtered("shapes of other bits", ".//geom[@contype] | .//geom[@conaffinity]",
             touching(b='contype="2" conaffinity="2"'), above(pairs=meeting("floor:a")),
-            rewrite="Say in the engine what may touch."),
+            rewrite="Set the pairs that may touch in the engine."),
         filtered("shape that touches nothing", ".//geom[@contype='0'][@conaffinity='0']", touching(b=apart),
             above("floor a", meeting("floor:a"))),
         filtered("bits of a class", ".//default/geom[@contype] | .//default/geom[@conaffinity]",
@@ -121,12 +125,12 @@ def features() -> list[Feature]:
             above(pairs=meeting(*both)), rewrite="Write them at the geom itself."),
         filtered("pair of the file", "contact/pair", touching(a=apart, b=apart, tail=pair.format("")),
             above(pairs=meeting("a:b")), "A <pair> touches whatever the filters say.", "Let it touch in the engine."),
-        Feature("class around a class of its own",
+        Feature("class with a nested class",
             touching(a='class="bare"', b='class="bare"', head='<default><default class="drawn"><geom material="none"/>'
             '</default><default class="bare"><geom group="3"/></default></default>').replace('"upper" pos',
             '"upper" childclass="drawn" pos'), above(pairs=meeting(*both)), ".//default/geom[@material]",
-            "A geom that names a class has nothing of the childclass of its body.",
-            "Write at the geom itself what its class says, as --fix does.", ("shapes",)),
+            "A geom that names a class ignores the childclass of its body.",
+            "Write the values of the class at the geom itself, as --fix does.", ("shapes",)),
         filtered("contacts switched off", "option/flag[@contact]",
             touching(head='<option><flag contact="disable"/></option>'), above(), switched),
         rough("friction of two shapes", ".//geom[@friction]", touching('friction=".5"', 'friction=".8"'),
@@ -150,7 +154,7 @@ def features() -> list[Feature]:
             '.03" margin=".04" solref=".05 .8" solimp=".8 .9 .01"')), above(pairs=meeting("a:b", dimension=6,
             friction=(0.4, 0.5, 0.02, 0.01, 0.03), margin=0.04, law=softness(0.05, 0.8, 0.9))),
             "contact/pair[@friction] | contact/pair[@margin] | contact/pair[@condim] | contact/pair[@solref]",
-            "A <pair> has what it says, whatever its shapes say.", DIRECT, ("surfaces", "softness")),
+            "The values of a <pair> override those of its shapes.", DIRECT, ("surfaces", "softness")),
         soft("softness of two shapes", ".//geom[@solref]", softness(0.035, 0.9), MIXED_SOFT, a='solref=".05 .8"'),
         soft("softness by solmix", ".//geom[@solmix]", softness(0.03, 0.9, 0.9), MIXED_SOFT,
             floor='solref=".02 1"', a='solref=".06 .6" solmix=".3333333333333333" solimp=".8 .75 .01"'),

@@ -49,7 +49,8 @@ def features() -> list[Feature]:
         Feature("fixed body with a pose under the world", mjcf(before=fixed, behind="</body>"),
             arm().replace(bodies=(root, replace(UPPER, parent="root"), LOWER)),
             "worldbody/body[@pos]!joint,freejoint | worldbody/body[@quat]!joint,freejoint",
-            "A body without joints stands in its parent at its pose.", "Put its pose into that of the bodies on it."),
+            ("A body without joints is fixed to its parent at "
+                "its pose."), "Merge its pose into those of its child bodies."),
         Feature("fixed body in the tree",
             mjcf(lower_inertial=LOWER_INERTIAL + f'<body name="hand" pos="0 .1 -.3" quat="{hw!r} {hx!r} {hy!r} '
             f'{hz!r}"><inertial pos=".02 0 .01" mass=".5" diaginertia=".003 .004 .005"/></body>'),
@@ -57,9 +58,9 @@ def features() -> list[Feature]:
             rule="A body without joints is part of its parent."),
         Feature("frame", mjcf(inside='<frame pos="0 0 -.1" euler="0 0 90">',
             behind="").replace("</body>\n    </body>", "</body></frame>\n    </body>"), arm(lower={"position": (-0.05,
-            0.0, -0.5)} | turned(("z", 90))), ".//frame", "A <frame> moves what stands in it.",
-            "Put its pose into that of what stands in it."),
+            0.0, -0.5)} | turned(("z", 90))), ".//frame", "A <frame> moves its contents.",
+            "Merge its pose into those of its contents."),
         Feature("included file", mjcf(inside="", lower_inertial='<include file="part.xml"/>'), arm(), ".//include",
-            "A file stands where it is included.", "Write one file.",
+            "The content of a file is placed where it is included.", "Write one file.",
             files={"part.xml": f"<mujocoinclude>{LOWER_INERTIAL}</mujocoinclude>"}),
     ]  # fmt: skip

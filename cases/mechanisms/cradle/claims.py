@@ -89,11 +89,11 @@ def _momentum(run: Trajectory, case: Case) -> float:
     return float(np.max(np.abs(momentum - momentum[0])) / abs(momentum[0]))
 
 
-_BEHIND = "speeds behind the collisions against {}, over the speed that came in"
+_BEHIND = "speeds after the collisions against {}, relative to the incoming speed"
 METRICS = {
-    "balls_out": CaseMetric(doc="balls that leave with more than half the speed that came in", number=_balls_out),
+    "balls_out": CaseMetric(doc="balls that leave with more than half the incoming speed", number=_balls_out),
     "energy_created": CaseMetric(
-        doc="energy behind the collisions less that before, over the kinetic energy that came in",
+        doc="energy after the collisions minus that before, relative to the incoming kinetic energy",
         number=_energy_created, always=True,
     ),
     **{
@@ -109,7 +109,7 @@ METRICS = {
 }  # fmt: skip
 SLIDING = {
     "momentum": CaseMetric(
-        doc="momentum that appeared or got lost on the line, over what came in", number=_momentum, always=True
+        doc="momentum gained or lost on the line, relative to the incoming momentum", number=_momentum, always=True
     )
 }
 """Of sliders alone: strings take momentum up."""
@@ -124,9 +124,9 @@ OBVIOUS = (
     "ms just resolves (solref -10000 0) and Euler's method, not the case's law."
 )
 AT_ONCE = "All impacts are solved together, as a complementarity problem: touching balls act as one block."
-IN_TURN = "Impacts come one after another, in no time: what the ideal cradle does, not what this rule asks for."
+IN_TURN = "Impacts are instantaneous and follow one another, as in the ideal cradle, but not as this rule requires."
 STEPPING = "Time stepping with all contacts in one complementarity problem: first order, touching balls are one block."
-IMPACT = "Impacts in no time replace the law of contacts: nothing overlaps, nothing is compressed."
+IMPACT = "Instantaneous impacts replace the law of contacts: nothing overlaps, nothing is compressed."
 
 _OTHERS: dict[str, Mapping[tuple[str, str], str]] = {
     "sequential": {
@@ -146,9 +146,9 @@ _OTHERS: dict[str, Mapping[tuple[str, str], str]] = {
 
 _EXACT = "straight lines between impacts: rounding"
 _LOCATED = "tolerances of 1e-9 and 1e-10, from touch to touch"
-_RESTING = "rows that touch at rest let go and touch again by rounding: touches are not matched with certainty"
-_FIXED = "Runge-Kutta 4 with located events, twenty steps a contact"
-_KEPT = "what acts on one ball acts on its neighbour"
+_RESTING = "rows that touch at rest release and touch again by rounding: touches cannot be matched with certainty"
+_FIXED = "Runge-Kutta 4 with located events, twenty steps per contact"
+_KEPT = "a force on one ball acts on its neighbour"
 
 _OTHER_PHYSICS = (
     ("mujoco", "default", OBVIOUS), ("pinocchio", "impulse", IMPACT),
@@ -187,7 +187,7 @@ _TOUCHING: Bounds = {
     "position": (1e-5, _RESTING),
 }
 _STEP: Mapping[tuple[str, str], tuple[float, str]] = {
-    ("mujoco", "matched"): (1e-4, "Runge-Kutta 4 with located events, twenty steps a contact, then straight lines"),
+    ("mujoco", "matched"): (1e-4, "Runge-Kutta 4 with located events, twenty steps per contact, then straight lines"),
     ("pinocchio", "law"): (2e-5, "relative tolerance of 1e-10, in many short arcs where balls touch"),
 }
 """Sliders: largest error of position against the engine's own equations (twice what was measured)."""

@@ -46,9 +46,7 @@ def _swing_period(run: Trajectory, case: Case) -> float | None:
 
 METRICS = {
     "flange": CaseMetric(doc="position of the flange against the truth's", unit="m", signal=flange, always=True),
-    "swing_period": CaseMetric(
-        doc="period of the flange's swing along x behind a push", unit="s", number=_swing_period
-    ),
+    "swing_period": CaseMetric(doc="period of the flange's swing along x after a push", unit="s", number=_swing_period),
 }
 FOLLOWING = {
     "tracking_error": CaseMetric(
@@ -62,7 +60,7 @@ FOLLOWING = {
 SOFT = (
     "The obvious model has MuJoCo's own equality constants (solref 0.02 1), its "
     "regularisation and a step of 2 ms, not the closures' law: tips stay some tenths of a "
-    "millimetre apart and lam is off by percents."
+    "millimetre apart and lam is off by some per cent."
 )
 _TIGHT = "tolerances of 1e-9 and 1e-10 and steps of 1 ms leave less than this on a smooth motion"
 _TOLERANCE, _GROWTH, _ADDED = 1e-9, 2e3, 50.0
@@ -71,9 +69,12 @@ in the heavy one, moved aside by 1e-8 m); independent errors of some 2,500 steps
 _FALLEN = _TOLERANCE * _GROWTH * _ADDED
 _LEVER = 0.1
 """Of the flange, m/rad, in order of magnitude: its links are .1 to .3 m long and share an angle's error."""
-_GROWN = "the tolerance, times 2,000 by which the fall makes differences grow, times 50 in which those of steps add up"
-_STEPS = "a fixed step of 1 ms where the robot folds in some ten of them; the error falls with the fourth power of it"
-_COUNTS = "readings near the middle between two counts of the encoder round either way, and a count is 24 urad"
+_GROWN = "the tolerance, times 2,000 for the growth of differences in the fall, times 50 for the errors of all steps"
+_STEPS = (
+    "a fixed step of 1 ms, although the robot folds within some ten steps; the error is proportional to "
+    "its fourth power"
+)
+_COUNTS = "readings halfway between two counts of the encoder round either way, and a count is 24 urad"
 
 Bounds = Mapping[str, tuple[float, str]]
 
@@ -113,11 +114,11 @@ _FALL: Bounds = {
 }
 _SAMPLED: Bounds = {
     "position": (5e-5, _COUNTS + ", of half a radian"),
-    "velocity": (1e-2, _COUNTS + ": a few steps of the torque show in what they accelerate"),
+    "velocity": (1e-2, _COUNTS + ": a few steps of the torque show in the accelerations"),
     "lam_impulse_path": (1e-3, _COUNTS),
     "flange": (1e-6, _COUNTS),
     "angle_error": (1e-5, _COUNTS),
-    "lam_error": (1e-1, _COUNTS + ": one more or less shows in the differentiated reading, so in the torque"),
+    "lam_error": (1e-1, _COUNTS + ": one more or less shows in the differentiated reading, and so in the torque"),
     "constraint_drift": (1e-8, _TIGHT),
     "energy_drift": (1e-2, _COUNTS),
 }
@@ -133,7 +134,10 @@ def tracking(grown: float) -> tuple[Limit, ...]:
     """Limits of a robot on a circle, of whose radius a part has grown at the horizon."""
     value, why = _SAMPLED["position"]
     aside = {
-        "position": (value / grown, why + ", over the part of the radius that is reached: sideways angles grow with it")
+        "position": (
+            value / grown,
+            why + (", over the part of the radius that is reached, with which sideways angles grow"),
+        )
     }
     return tuple(_limits({**_SAMPLED, **aside}))
 
@@ -146,5 +150,5 @@ def on_the_circle(lag: float, settled: bool) -> Limit:
     """
     if settled:
         return Limit(metric="tracking_error", value=0.1 * lag, why="the lag's next order, encoder counts and friction")
-    why = "what is left of the start, decaying as exp(-7 t); less than the lag, so that 0 does not pass"
+    why = "the remainder of the start, decaying as exp(-7 t); less than the lag, so that 0 does not pass"
     return Limit(metric="tracking_error", value=0.8 * lag, why=why)

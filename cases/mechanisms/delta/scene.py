@@ -25,7 +25,7 @@ ROBOT = {
     "d1": Parameter(default=0.05, unit="N m s", doc="viscous friction on q_i1", low=0.0),
     "d2": Parameter(default=0.0125, unit="N m s", doc="viscous friction on q_i2", low=0.0),
     "d3": Parameter(default=0.0125, unit="N m s", doc="viscous friction on q_i3", low=0.0),
-    "sign": Parameter(default=1.0, doc="arms 2 and 3 stand at -120 and +120 degrees times this, 1 or -1"),
+    "sign": Parameter(default=1.0, doc="arms 2 and 3 are at -120 and +120 degrees times this, 1 or -1"),
     "p": Parameter(default=5.0, unit="1/s", doc="double pole of the closures", low=0.0),
 }
 HEAVY: dict[str, Value] = {"m1": 2.5, "m2": 3.0, "m3": 4.0, "gravity": 9.8, "d1": 0.5, "d2": 0.125, "d3": 0.125}

@@ -95,7 +95,8 @@ def mixed(pull: float, step: float = STEP) -> float:
 
 
 CREEPS = (
-    "it creeps as its own parameters predict: its friction is a function of the slip, so no force acts without slip"
+    "it creeps at the speed that its parameters predict: its friction is a function of the slip, so there is "
+    "no force without slip"
 )
 NEAR = 0.05  # part of a predicted creep by which the measured one may be off
 NOTHING: Mapping[tuple[str, str], float] = MappingProxyType({})
@@ -103,7 +104,7 @@ SOFT = Limit(
     metric="*", engine="mujoco", profile="default", covers_none=True, known="MuJoCo's own soft contacts and step"
 )  # fmt: skip
 """What takes it outside where nothing rubs: where something does, that of every case with friction stands."""
-HELD = "friction holds: what is left of a slip decays as a gap does"
+HELD = "friction sticks: the remaining slip decays as a gap does"
 
 
 def limits(

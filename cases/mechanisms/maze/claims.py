@@ -51,14 +51,14 @@ def _unstable_pole(run: Trajectory, case: Case) -> float | None:
 
 METRICS = {
     "leave_angle": CaseMetric(
-        doc="cosine of the angle from the top at which the ball leaves an outer face", number=_leave_angle
+        doc="cosine of the angle, from the top, at which the ball leaves an outer face", number=_leave_angle
     ),
     "ring_changes": CaseMetric(
-        doc="how often the ball passes a ring, inward and outward",
+        doc="number of times that the ball passes a ring, inward and outward",
         number=lambda run, case: float(len(ring_changes(run, case))),
     ),
     "ring_change_times": CaseMetric(
-        doc="how far the instants at which the ball passes a ring are off", unit="s", instants=ring_changes, always=True
+        doc="error of the instants at which the ball passes a ring", unit="s", instants=ring_changes, always=True
     ),
     "swing_period": CaseMetric(
         doc="period of the ball's swing inside a ring", unit="s", number=lambda run, case: period(run.t, run.q[:, 1])
@@ -180,7 +180,7 @@ def _solved(p: Mapping[str, Value], maze: Maze) -> Iterator[Claim]:
     if p["controller"] == "off" or float(p["t_end"]) < ARRIVED:
         return
     yield Claim(
-        metric="ring_changes", expected=float(p["ring"]) + 1.0, tier=Tier.B, source="one change a ring, to the centre"
+        metric="ring_changes", expected=float(p["ring"]) + 1.0, tier=Tier.B, source="one change per ring, to the centre"
     )  # fmt: skip
     if not p["rolling_damping"]:
         yield Claim(
@@ -193,11 +193,11 @@ ARRIVED = 60.0  # from when on the default run is at rest in the centre, s
 
 OBVIOUS = (
     "The obvious model builds rings of segments and has MuJoCo's own contact constants and "
-    "friction, not the case's law: it rolls over facets, sinks in and slips."
+    "friction, not the case's law: the ball rolls over facets, sinks in and slips."
 )
 _TOLERANCE = "a thousand times the default tolerance of 1e-9"
 _LOG = "read between the samples of a run"
-_SMALL = "a tolerance of 1e-9 in the height, over that through which the ball moves, a part of its circle's radius"
+_SMALL = "a tolerance of 1e-9 in the height, relative to the height through which the ball moves"
 _TOLERATED, _DEFAULT = 1e-9, 1e-6
 """Default tolerance, and the limit that every case has on energies over the largest kinetic one."""
 _ENERGIES = ("energy_drift", "energy_integrator", "contact_work")
@@ -206,7 +206,7 @@ _CLAIMED: Mapping[str, tuple[float, str]] = {
     "unstable_pole": (1e-6, _TOLERANCE),
     "leave_angle": (1e-5, _LOG),
     "ring_changes": (0.0, "a count"),
-    "contact_loss": (7e-6, "1 % of 0.70 mJ: what the input works is not in the claim"),
+    "contact_loss": (7e-6, "1 % of 0.70 mJ: the work of the input is not in the claim"),
 }
 """Judged where the case claims a number."""
 _ALWAYS: Mapping[str, tuple[float, str]] = {"ring_change_times": (1e-6, _TOLERANCE)}

@@ -17,7 +17,7 @@ from crossbody.cases.mechanisms.maze.gates import GUARDS, force, guards, rows, s
 from crossbody.cases.mechanisms.maze.geometry import THICKNESS, Maze, Ring, maze_of, tilted_gravity
 from crossbody.cases.scene import Actuator, Body, Joint, Scene, Shape
 
-ONLY_CONTINUOUS = "The torque is evaluated at every state here; a sampled controller runs in the reference alone."
+ONLY_CONTINUOUS = "The torque is evaluated at every state here; only the reference runs a sampled controller."
 CHORD = math.radians(5.0)  # longest chord of a wall, as an angle at the axis
 TURNING = (0.005, 0.0001)  # torsional and rolling friction of a shape, as a file has them that says nothing
 FAR, FAST = (1.0, 1e-3, 1e-3, 1.0), (1.0, 1e-1, 1e-1, 1.0)

@@ -101,7 +101,7 @@ def parameters() -> dict[str, Parameter]:
             f"outer{i}": Parameter(default=outer, unit="m", doc=f"outer radius of ring {i}", low=0.0, open_low=True),
             f"gaps{i}": Parameter(default=gaps, doc=f"number of gaps in ring {i}", low=0, high=1e4),
             f"width{i}": Parameter(default=width, unit="deg", doc=f"angle of each gap in ring {i}", low=0.0),
-            f"phase{i}": Parameter(default=phase, unit="deg", doc=f"where gap 0 of ring {i} stands at theta = 0"),
+            f"phase{i}": Parameter(default=phase, unit="deg", doc=f"position of gap 0 of ring {i} at theta = 0"),
         }
     return found | {
         "wall": Parameter(default=96.8e-3, unit="m", doc=f"radius of the wall around {TABLE} rings", low=0.0)

@@ -39,7 +39,7 @@ METRICS = {
     "mode_order": CaseMetric(
         doc="mode changes in the order of the presentation, before anything else: 5 if all", number=_mode_order
     ),
-    "foot_lam": CaseMetric(doc="smallest multiplier of the feet that the slab stands on", unit="N", number=_foot_lam),
+    "foot_lam": CaseMetric(doc="smallest multiplier of the feet of the slab", unit="N", number=_foot_lam),
     "peak_lam3": CaseMetric(doc="largest multiplier of the left corner", unit="N", number=_corner_lam),
     "wall_lam": CaseMetric(
         doc="largest multiplier of the wall beside the body, which is never reached", unit="N", number=_wall_lam
@@ -49,20 +49,20 @@ METRICS = {
 
 REAL_TIME = (
     "It integrates collisions in real time: while one lasts, bodies move and gravity acts, so "
-    "that velocities behind it differ from those of a collision in no time as b0^(-1/2)."
+    "that velocities after it differ from those of an instantaneous collision as b0^(-1/2)."
 )
 IN_NO_TIME = (
-    "Collisions take no time: what moves and what gravity does while one lasts is missing, as "
+    "Collisions take no time: motion and the effect of gravity during one are missing, as "
     "b0^(-1/2), and so are the pulses of lam."
 )
-RIGID = "A restitution stands for the constants of COLLISION, and a rigid row for those of CONTACT."
+RIGID = "A restitution replaces the constants of COLLISION, and a rigid row those of CONTACT."
 STEPPING = (
     "Time stepping at 1 ms with the restitution of each row: first order, no capture and no "
     "second set of constants; the left corner hops once before it rests."
 )
 OBVIOUS = (
     "The obvious model has MuJoCo's own contact constants (solref 0.02 1), one set for all, "
-    "and a step of 2 ms: the left corner is not let go when the right one lands."
+    "and a step of 2 ms: the left corner is not released when the right one lands."
 )
 
 Bounds = Mapping[str, tuple[float, str]]
@@ -87,7 +87,7 @@ _CLAIMS: Bounds = {
 _MATCHED_BOUNDS: Bounds = {
     "mode_times": (4e-5, "the hand-over is taken at the end of its step of 39 us"),
     "energy_drift": (1e-5, "Runge-Kutta 4 with located events at 39 us"),
-    "foot_lam": (1e-3, "the engine's own solver leaves this much of lam"),
+    "foot_lam": (1e-3, "the residual of the engine's own solver in lam"),
     "velocity": (1e-4, "Runge-Kutta 4 with located events at 39 us"),
 }
 """What MuJoCo's fixed step costs where it follows the case's law."""

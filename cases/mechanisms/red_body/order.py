@@ -201,4 +201,4 @@ def _broken(p: Mapping[str, float], frozen: bool) -> Iterator[str]:
     if not fall.inertia > arm:
         yield f"the box is too flat: its inertia {fall.inertia:.3g} kg m^2 must be above m a^2 = {arm:.3g} kg m^2"
     elif not frozen and not 2.0 * arm / (fall.inertia - arm) * rest < fall.recoil:
-        yield f"the blow of the right corner, {fall.recoil:.3g} m/s^2, is too weak to lift the left one"
+        yield f"the impact of the right corner, {fall.recoil:.3g} m/s^2, is too weak to lift the left one"

@@ -83,7 +83,7 @@ def _drift(run: Trajectory, case: Case) -> float:
 
 METRICS = {
     "block_end": CaseMetric(
-        doc="where the block stands at the end, along the fingers",
+        doc="final position of the block along the fingers",
         unit="m", number=lambda run, case: float(block(run, case)[0][-1]),
     ),
     "contact_imbalance": CaseMetric(
@@ -94,7 +94,7 @@ METRICS = {
         unit="N", number=lambda run, case: abs(float(imbalance(run.lam, case)[-1])),
     ),
     "flange_end": CaseMetric(
-        doc="where the flange stands at the end, along the fingers: who moved, robot or block",
+        doc="final position of the flange along the fingers: whether robot or block moved",
         unit="m", number=lambda run, case: float(flange(run, case)[-1]),
     ),
     "tactile_invariant": CaseMetric(
@@ -209,7 +209,7 @@ _BOUNDS = {
     "contact_imbalance": (1e-3, "the last digit printed"),
     "velocity": (1e-4, _STIFF),
     "energy_drift": (1e-4, _WEIGHT),
-    "block_end": (2e-6, "the slowest pole leaves exp(-2.8 t) of the shift, and a moving block a reading"),
+    "block_end": (2e-6, "the slowest pole leaves exp(-2.8 t) of the shift, and a moving block causes a reading"),
     "flange_end": (2e-6, "the slowest pole leaves exp(-2.8 t) of the shift"),
     "tactile_invariant": (1e-12, "Runge-Kutta methods keep linear invariants to rounding"),
 }
@@ -246,9 +246,9 @@ def _fixed_steps(p: Mapping[str, float], moving: float) -> Iterator[tuple[str, f
     missed = abs(math.exp(z) - left) * p["a1"] / fast
     along = missed / (1.0 - left) ** 2 / fast * _PEAK / (p["close_end"] - p["close_start"])
     yield "velocity", missed, _STEPPED + "its error in exp(-1.5), times a1 over the pad's rate"
-    yield "position", along, _STEPPED + "the velocity's, over the pad's rate, on the way of the jaws"
-    yield "gap_error", along, _STEPPED + "the velocity's, over the pad's rate, on the way of the jaws"
-    yield "energy_drift", 4.0 * missed * p["pad_mass"] / moving, _STEPPED + "twice the velocity's, in both pads"
+    yield "position", along, _STEPPED + "that of the velocity, divided by the pad's rate, over the travel of the jaws"
+    yield "gap_error", along, _STEPPED + "that of the velocity, divided by the pad's rate, over the travel of the jaws"
+    yield "energy_drift", 4.0 * missed * p["pad_mass"] / moving, _STEPPED + "twice that of the velocity, in both pads"
 
 
 def limits(variant: str, claimed: Iterable[Claim], p: Mapping[str, float]) -> tuple[Limit, ...]:

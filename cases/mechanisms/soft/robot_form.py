@@ -46,8 +46,8 @@ ROBOT = {
     "table": Parameter(default=0.62, unit="m", doc="depth of the table"),
     "high": Parameter(default=0.58, unit="m", doc="depth of the flange at the start and at the end"),
     "low": Parameter(default=0.60, unit="m", doc="depth of the flange during the grasp"),
-    "descent": Parameter(default=1.0, unit="s", doc="how long it comes down", low=0.0, open_low=True),
-    "rise": Parameter(default=5.2, unit="s", doc="when it begins to rise", low=0.0),
+    "descent": Parameter(default=1.0, unit="s", doc="duration of the descent", low=0.0, open_low=True),
+    "rise": Parameter(default=5.2, unit="s", doc="time at which it begins to rise", low=0.0),
     "rise_time": Parameter(default=1.0, unit="s", doc="how long it rises", low=0.0, open_low=True),
 }
 COORDINATES = (
@@ -71,7 +71,7 @@ def check(p: Mapping[str, float]) -> None:
     """Check the flange's path."""
     if p["rise"] < p["descent"]:
         raise InvalidValue(
-            f"soft_contact: rise is {p['rise']:g} s; the flange comes down until descent = "
+            f"soft_contact: rise is {p['rise']:g} s; the flange descends until descent = "
             f"{p['descent']:g} s, so it must be at least that."
         )
 

@@ -14,7 +14,7 @@ from crossbody.cases.parameters import of_numbers
 FINGERS = {
     "kstar": Parameter(default=20.0, unit="cm/(s N)", doc="gain of the tactile loop: x_ref' = k* (y_R - y_L)", low=0.0),
     "ks": Parameter(default=100.0, unit="rad/s", doc="bandwidth of the touch sensors", low=0.0, open_low=True),
-    "offset": Parameter(default=8e-3, unit="m", doc="where the block starts, off the middle of the fingers"),
+    "offset": Parameter(default=8e-3, unit="m", doc="initial offset of the block from the middle of the fingers"),
     "block_mass": Parameter(default=0.1, unit="kg", doc="mass of the block", low=0.0, open_low=True),
     "width": Parameter(default=0.04, unit="m", doc="width of the block", low=0.0, open_low=True),
     "bt": Parameter(default=20.0, unit="N s/m", doc="viscous friction of the block on the table", low=0.0),
@@ -28,9 +28,9 @@ FINGERS = {
     "gain_i": Parameter(default=343.0, unit="1/s^3", doc="integral gain of the flange's loop", low=0.0),
     "jaw": Parameter(default=12e-3, unit="m", doc="free space on each side of a centred block", low=0.0),
     "squeeze": Parameter(default=1e-4, unit="m", doc="interference on each side once closed", low=0.0),
-    "close_start": Parameter(default=1.0, unit="s", doc="when the jaws begin to close", low=0.0),
+    "close_start": Parameter(default=1.0, unit="s", doc="time at which the jaws begin to close", low=0.0),
     "close_end": Parameter(default=3.0, unit="s", doc="when they are closed", low=0.0, open_low=True),
-    "release": Parameter(default=0.0, unit="s", doc="when they begin to open; 0 for never", low=0.0),
+    "release": Parameter(default=0.0, unit="s", doc="time at which they begin to open; 0 for never", low=0.0),
     "release_time": Parameter(default=1.0, unit="s", doc="how long they open", low=0.0, open_low=True),
 }
 AXIS = {

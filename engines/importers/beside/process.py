@@ -50,7 +50,7 @@ def tried(module: Any) -> str:
     number = [int(word) for word in re.findall(r"\d+", found)[:2]]
     if not found or [int(word) for word in low.split(".")] <= number <= [int(word) for word in high.split(".")]:
         return ""
-    return f"{module.PACKAGE} is of version {found}; its importer was tried with {low} to {high}."
+    return f"{module.PACKAGE} has version {found}; its importer was tested with {low} to {high}."
 
 
 def answered(module: Any, file: str, urdf: bool, job: Any, size: int, measured: Any) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def answered(module: Any, file: str, urdf: bool, job: Any, size: int, measured: 
         why = f"It needs the package {module.PACKAGE if own else lacking}, which is not installed."
         return {"status": "absent" if own else "failed", "why": why}
     except MemoryError:
-        return {"status": "failed", "why": f"It wants more than {size >> 20} MiB of memory."}
+        return {"status": "failed", "why": f"It needs more than {size >> 20} MiB of memory."}
     except Exception as error:
         return {"status": "failed", "why": " ".join(f"{type(error).__name__}: {error}".split())}
 
@@ -79,7 +79,7 @@ def _loaded(name: str, path: Path) -> Any:
     """Return a module by its file, and let it be known by its name."""
     spec = spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise ImportError(f"{path} is no Python file")
+        raise ImportError(f"{path} is not a Python file")
     sys.modules[name] = module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

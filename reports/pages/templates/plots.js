@@ -127,9 +127,22 @@
     }
   }, { rootMargin: "500px" });
   crossbody.each(".plot", prepare);
+  // Of figures of several contacts those of one are seen, the same in every section of a page that has it.
+  const choose = (select) => {
+    const section = select.closest("section");
+    section.querySelectorAll("[data-of]").forEach((each) => { each.hidden = each.dataset.of !== select.value; });
+    section.querySelectorAll("[data-of]:not([hidden]) .plot").forEach((box) => { if ("drawn" in box.dataset) Plotly.Plots.resize(box); });
+  };
+  crossbody.each("[data-choice]", (select) => {
+    choose(select);
+    select.addEventListener("change", () => select.closest("[data-page]").querySelectorAll("[data-choice]").forEach((each) => {
+      if ([...each.options].some((option) => option.value === select.value)) each.value = select.value;
+      choose(each);
+    }));
+  });
   const sized = (size) => charts.forEach((_, box) => Plotly.relayout(box, size));
   addEventListener("beforeprint", () => {
-    document.querySelectorAll(".plot").forEach(draw);
+    document.querySelectorAll(".plot:not([hidden] *)").forEach(draw);
     sized({ width: PAPER, autosize: false });
   });
   addEventListener("afterprint", () => sized({ width: null, autosize: true }));
