@@ -232,8 +232,9 @@ class Shape(_Named):
     sizes: ClassVar[dict[str, int]] = {"size": 3, "position": 3, "orientation": 4, "friction": 3}
 
     def __post_init__(self) -> None:
-        """Check that a hull, and nothing else, has corners, and that they fill a space."""
+        """Check the friction; that a hull, and nothing else, has corners, and that they fill a space."""
         _Named.__post_init__(self)
+        _check_friction(self)
         what = f"Shape {self.name!r}"
         if (self.type == "hull") != bool(self.corners):
             raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; only a hull has any.")
@@ -285,8 +286,15 @@ class Pair(_Named):
         _Named.__post_init__(self)
         if self.dimension not in DIMENSIONS:
             raise SceneError(f"Pair {self.name!r}: dimension is {shown(self.dimension)}; valid: {DIMENSIONS}.")
-        if not all(0.0 <= mu < math.inf for mu in self.friction):
-            raise SceneError(f"Pair {self.name!r}: friction is {self.friction}; it must be at least 0 and finite.")
+        _check_friction(self)
+
+
+def _check_friction(part: Shape | Pair) -> None:
+    """Check the coefficients of a shape or a pair: of two shapes the larger holds, which may hide a negative one."""
+    if not all(0.0 <= mu < math.inf for mu in part.friction):
+        raise SceneError(
+            f"{type(part).__name__} {part.name!r}: friction is {part.friction}; it must be at least 0 and finite."
+        )
 
 
 ROWS = {"connect": 3, "weld": 6, "joint": 1, "tendon": 1}  # of every type of loop
