@@ -251,10 +251,10 @@ class ModeProblem:
                 modes[i] = wrong[i][1]
                 if modes[i] == Mode.SLIP and i in self.stands:
                     along = self._along(i)
-                    drive = tried.excess[along] if i in self.sliding.dry else -tried.lam[along]
-                    drive = (
-                        drive if drive.any() else -tried.lam[along] if i in self.sliding.dry else tried.excess[along]
-                    )
+                    drive, other = -tried.lam[along], tried.excess[along]
+                    if i in self.sliding.dry:
+                        drive, other = other, drive
+                    drive = drive if drive.any() else other
                     ways[i] = drive / np.linalg.norm(drive)
         return None
 

@@ -103,7 +103,9 @@ def test_controls_of_another_width_are_refused(kind: str, tmp_path: Path) -> Non
         np.savez(path, t=table["t"], ctrl=table[["m", "other"]])
     else:
         (table.to_csv if kind == "csv" else table.to_parquet)(path, index=False)
-    with pytest.raises(InvalidValue, match=r"no actuator's; valid: a table with the columns t, m\.|valid: \(2, 1\)\."):
+    with pytest.raises(
+        InvalidValue, match=r"does not belong to an actuator; valid: a table with the columns t, m\.|valid: \(2, 1\)\."
+    ):
         cases.load(arm, ctrl=str(path))
 
 

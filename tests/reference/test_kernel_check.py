@@ -106,7 +106,7 @@ def _accumulated(t, q, v, u, p, M, f, w):
     ("changes", "words"),
     [
         ({"dynamics": _unfilled}, ["M[0, 1]", "unfilled"]),
-        ({"dynamics": _accumulated, "mass_block": 1}, ["f[0]", "stood"]),
+        ({"dynamics": _accumulated, "mass_block": 1}, ["f[0]", "previous content"]),
         ({"mass_block": 1}, ["writes beyond M", "(3, 1)"]),
         ({"constant_mass": True}, ["System.constant_mass", "M["]),
         ({"affine": True}, ["System.affine", "M["]),

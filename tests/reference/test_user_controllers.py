@@ -354,7 +354,7 @@ def test_what_contradicts_a_control_is_refused() -> None:
         cases.from_scene(ARM.replace(actuators=()), control=Control(pd, 0.1))
     with pytest.raises(InvalidValue, match="at most"):
         arm(pd, tick=1e-12)
-    with pytest.raises(SceneError, match="is no scene"):
+    with pytest.raises(SceneError, match="is not a scene"):
         replace(cases.load("soft_contact"), control=Control(pd, 0.1))
     with pytest.raises(SceneError, match="sets 3 inputs"):
         replace(system(ARM, NO_LAW), control=Control(pd, 0.1, width=3))
