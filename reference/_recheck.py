@@ -116,9 +116,8 @@ def _recorded(run: Trajectory, rows: list[int], rtol: float) -> Iterator[Violati
     """The motion's own rows, by their gaps and multipliers; the instants of events belong to two modes."""
     quiet = ~np.isin(run.t, [e.t for e in run.events])
     near = _near(run, rtol) + DEEP
-    force = (
-        WEAK * rtol * float(np.nan_to_num(np.abs(run.lam)).max(initial=0.0))
-    )  # one that bears nothing has the rounding of what others do
+    largest = float(np.nan_to_num(np.abs(run.lam)).max(initial=0.0))
+    force = WEAK * rtol * largest  # one that bears nothing has the rounding of what others do
     for i in rows:
         for mode in Mode:
             here = quiet & (run.mode[:, i] == mode)
