@@ -228,8 +228,10 @@ def _say_outside(rows: pd.DataFrame) -> None:
 def _say(found: Comparison, metrics: pd.DataFrame) -> None:
     source = f"{replay.tier(found.log)}: {found.log.provenance.file}"
     click.echo(layout.told(f"{source} on {found.model}, {len(found.windows)} windows"))
-    for finding in found.log.findings:
-        click.echo(layout.told(f"note: {finding.channel}, row {finding.row}: {finding.text}"))
+    for one in replay.findings(found).to_dict(orient="records"):
+        if one["what"] != "repair":
+            place = f"{one['channel']}, row {one['row']}: " if one["channel"] else ""
+            click.echo(layout.told(f"note: {place}{one['text']}"))
     units = metrics["unit"].map(lambda unit: unit_text(unit, " [{}]"))
     name = (metrics["metric"] + " " + metrics["channel"]).str.strip() + units
     wide = metrics.assign(metric=name).pivot(index="metric", columns="who", values="value").loc[name.unique()]

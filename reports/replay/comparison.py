@@ -146,7 +146,7 @@ def verdicts(found: Comparison, command: str, given: Sequence[Limit] = (), fit: 
 
 
 def findings(found: Comparison) -> pd.DataFrame:
-    """What the checks noticed about the log, and what was repaired."""
+    """What the checks noticed about the log, what was repaired, and what is left over behind the last window."""
     told = [
         {"what": f.check, "channel": f.channel, "row": f.row, "t": f.t, "text": f.text} for f in found.log.findings
     ]  # fmt: skip
@@ -154,6 +154,12 @@ def findings(found: Comparison) -> pd.DataFrame:
         {"what": "repair", "channel": "", "row": r.row, "t": r.t, "text": f"{r.name}: {r.rows} rows"}
         for r in found.log.provenance.repairs
     ]
+    last = int(np.searchsorted(found.log.time, found.time.max()))
+    if (unused := found.log.time[-1] - found.log.time[last]) > 0.0:
+        text = (
+            f"The last {unused:g} s ({len(found.log) - 1 - last} samples) are shorter than a window and are not used."
+        )
+        told.append({"what": "windows", "channel": "", "row": last + 1, "t": found.log.time[last + 1], "text": text})
     return pd.DataFrame(told, columns=["what", "channel", "row", "t", "text"])
 
 

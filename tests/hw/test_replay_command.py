@@ -18,7 +18,7 @@ from crossbody.cases import InvalidValue, Limit
 from crossbody.hw.models.contract import Segment
 from crossbody.reports.cli import main
 from crossbody.reports.commands import replay as command
-from crossbody.reports.replay.comparison import verdicts
+from crossbody.reports.replay.comparison import findings, verdicts
 from crossbody.reports.runs import watch
 from crossbody.reports.sections.identify import sections
 from crossbody.reports.sections.replay import MEANS
@@ -309,3 +309,15 @@ def test_tables_of_an_identification_tell_its_own_numbers() -> None:
         "error": "rmse", "fitted_before": 21.0, "held_before": 20.0, "fitted_after": 23.0, "held_after": 25.0,
         "change": 25.0,
     }]  # fmt: skip
+
+
+@pytest.mark.parametrize(("count", "left"), [(4000, 1.998), (4001, 0.0), (4101, 0.2)])
+def test_what_no_window_covers_is_told(count: int, left: float) -> None:
+    """A log that is one sample short of its last window: a quarter of it was not replayed, and nothing said so."""
+    t = 2e-3 * np.arange(count)
+    log = log_of(t, channels("coordinates", "rad", {"th1": 0.1 * np.cos(5.0 * t)}))
+    found = findings(hw.replay(log, "single_pendulum", wanted=["reference"], restart=2.0))
+    told = found[found["what"] == "windows"]["text"].tolist()
+    samples = round(left / 2e-3)
+    wanted = [f"The last {left:g} s ({samples} samples) are shorter than a window and are not used."]
+    assert told == (wanted if left else [])
