@@ -37,16 +37,16 @@ PARAMETERS = {
         default=WHERE_MET, doc="contacts with friction have rows: 1, 0; -1: if the motion reaches one", low=-1, high=1
     ),
     "push": Parameter(
-        default="", doc=("forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; several separated by ;")
+        default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; several separated by ;"
     ),
     "rank": Parameter(
         default=-1,
-        doc=("number of independent rows of the loops; -1: those that are clearly independent"),
+        doc="number of independent rows of the loops; -1: those that are clearly independent",
         low=-1,
         high=1e6,
     ),
     "assemble": Parameter(
-        default=False, doc=("start at the nearest state to the keyframe that closes the loops"), low=0, high=1
+        default=False, doc="start at the nearest state to the keyframe that closes the loops", low=0, high=1
     ),
     "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }

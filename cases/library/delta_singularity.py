@@ -22,7 +22,7 @@ PARAMETERS = {
     "start_angle": Parameter(default=math.pi / 4, unit="rad", doc="motor angles at t = 0"),
     "ramp": Parameter(default=4.0, unit="s", doc="time in which the servos move", low=0.0, open_low=True),
     "offset": Parameter(
-        default=0.0, unit="rad", doc=("their final position, relative to the pose with coincident elbows")
+        default=0.0, unit="rad", doc="their final position, relative to the pose with coincident elbows"
     ),
     **delta.servos(20.0, 2.0),
     "force": Parameter(default=1.0, unit="N", doc="push on the flange along x"),

@@ -81,7 +81,7 @@ def _claims(balls: Row, rule: str) -> tuple[Claim, ...]:
             metric="balls_out",
             expected=float(balls.lifted),
             tier=Tier.A,
-            source=(f"{balls.lifted} in, {balls.lifted} out"),
+            source=f"{balls.lifted} in, {balls.lifted} out",
         ),
     )
 

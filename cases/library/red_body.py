@@ -160,7 +160,7 @@ def _order_claims(p: Mapping[str, float], frozen: bool) -> Iterator[Claim]:
     if frozen:
         impulse, source = (
             fall.caught + fall.struck,
-            ("the impulse that stops the left corner, and (1 + e) v / G44 of the right one"),
+            "the impulse that stops the left corner, and (1 + e) v / G44 of the right one",
         )
         yield Claim(metric="collision_impulse", expected=impulse, tier=Tier.A, source=source)
         return

@@ -98,7 +98,7 @@ PARAMETERS = {
     "width": Parameter(default=0.1, unit="m", doc="half of it", low=0.0, open_low=True),
     "height": Parameter(default=0.5, unit="m", doc="half of it", low=0.0, open_low=True),
     "tilt": Parameter(
-        default=0.5, doc=("initial angle, relative to that at which it balances"), low=0.0, high=1.0, open_low=True
+        default=0.5, doc="initial angle, relative to that at which it balances", low=0.0, high=1.0, open_low=True
     ),
 }
 

@@ -268,7 +268,7 @@ class March:
         if finite := all(bool(np.isfinite(x).all()) for x in (data.qpos, data.qvel, data.qacc)):
             self.tape.record(self.scene.lam(), self.now)
         return self._end(
-            Outcome.DIVERGED if finite else Outcome.NOT_FINITE, ("the state left the region that the scene can reach")
+            Outcome.DIVERGED if finite else Outcome.NOT_FINITE, "the state left the region that the scene can reach"
         )
 
     def _end(self, outcome: Outcome, what: str) -> bool:

@@ -37,7 +37,7 @@ METHOD = Parameter(default="Adams", doc="linear multistep method of CVODE", choi
 METHOD_OF_STIFF = replace(
     METHOD,
     default=AUTO,
-    doc=("that, or auto: the one that advances further per right-hand side"),
+    doc="that, or auto: the one that advances further per right-hand side",
     choices=(AUTO, *METHODS),
 )
 OF_GATES = replace(RTOL, default=1e-12), replace(METHOD, default="BDF")

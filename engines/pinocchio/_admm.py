@@ -97,7 +97,7 @@ class TimeStepper:
         while t_end - t > 1e-9 * dt:
             if self.steps >= self.max_steps:
                 return self._end(
-                    Outcome.STEP_LIMIT, t, q, v, (f"{self.max_steps} steps of {dt:g} s did not reach the horizon")
+                    Outcome.STEP_LIMIT, t, q, v, f"{self.max_steps} steps of {dt:g} s did not reach the horizon"
                 )
             tau = min(dt, t_end - t)
             closed = self._closed(q, v, tau)

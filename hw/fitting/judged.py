@@ -186,7 +186,7 @@ def _unseen(
         one = (
             f"{words} have no effect on the data"
             if len(part) == 1
-            else (f"One combination has no effect on the data: {words}")
+            else f"One combination has no effect on the data: {words}"
         )
         found[f"{one}. Fix one of them, for example {fix}." if len(part) > 1 else f"{one}: fix it."] = words
     seen = [j for j, i in enumerate(own) if not blind[i]]

@@ -103,7 +103,7 @@ class MeteredFile(io.BufferedReader):
             self._places[at] = self._places.get(at, 0) + 1
             if self._left < 0 or (left and self._places[at] > SAME):
                 raise LogFormatError(
-                    self._path, ("has blocks that lead back to themselves: damaged, or built that way on purpose.")
+                    self._path, "has blocks that lead back to themselves: damaged, or built that way on purpose."
                 )
         return found
 

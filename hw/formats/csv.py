@@ -226,7 +226,7 @@ def find_fault(
                     continue
                 if len(line) >= LINE or "\0" in line:
                     return LogFormatError(
-                        path, ("the line is not part of a text table (binary, or without an end)."), row
+                        path, "the line is not part of a text table (binary, or without an end).", row
                     )
                 if line.strip():
                     cells = next(csv.reader([line], delimiter=delimiter))

@@ -57,9 +57,7 @@ from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
-STILL = (
-    4096.0  # units of rounding of time by which it does not go on: forces that grow without bound switch ever sooner
-)
+STILL = 4096.0  # units of rounding by which time does not go on: before a jam contacts switch ever sooner
 SHORTER = 0.1  # the least part of a step that is taken anew because slips turn in it, wherever in it something fires
 
 

@@ -110,13 +110,16 @@ def _begin_at_last(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def _found(s: Any, m: Model, w: Work) -> bool:
-    """Whether a consistent set is found, contacts as they are tried first."""
+def _reached(s: Any, m: Model, w: Work) -> bool:
+    """Whether a consistent set is reached from contacts as they are, from what sweeps give, or on a way."""
     put_as_they_are(s, m, w)
-    return bool(
-        iterate(s, m, w, ALL) or swept(s, m, w, ALL) or swept(s, m, w, WORST)
-        or approached(s, m, w) or near_sets(s, m, w)
-    )  # fmt: skip
+    return bool(iterate(s, m, w, ALL) or swept(s, m, w, ALL) or swept(s, m, w, WORST) or approached(s, m, w))
+
+
+@compiled
+def _found(s: Any, m: Model, w: Work) -> bool:
+    """Whether a consistent set is reached, or found among those that differ in few contacts."""
+    return bool(_reached(s, m, w) or near_sets(s, m, w))
 
 
 @compiled
@@ -134,8 +137,7 @@ def _meet_all(s: Any, m: Model, w: Work) -> None:
     if most <= SLIGHT * s.push_scale:
         return
     s.strict = 1
-    put_as_they_are(s, m, w)
-    if not (iterate(s, m, w, ALL) or swept(s, m, w, ALL) or swept(s, m, w, WORST) or approached(s, m, w)):
+    if not _reached(s, m, w):
         s.strict = 0
         _found(s, m, w)
 

@@ -87,7 +87,7 @@ def error(case: Case, run: Trajectory, asked: Asked) -> Error:
     apart = float(np.max(_apart(truth, run)[run.t < until], initial=0.0))
     value = max(apart, _with_trace(max(shifts, default=0.0) / case.t_end, apart))
     return Error(
-        value=value, tier=found.tier, until=until, why=(f"diverges at t = {until:.3g} s; after that, {found.why}")
+        value=value, tier=found.tier, until=until, why=f"diverges at t = {until:.3g} s; after that, {found.why}"
     )
 
 

@@ -136,7 +136,7 @@ def tracking(grown: float) -> tuple[Limit, ...]:
     aside = {
         "position": (
             value / grown,
-            why + (", over the part of the radius that is reached, with which sideways angles grow"),
+            why + ", over the part of the radius that is reached, with which sideways angles grow",
         )
     }
     return tuple(_limits({**_SAMPLED, **aside}))
