@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import events, guards, journal, settle
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, scatter
-from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, NOTHING, ask, has_friction, is_dry
+from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, DIES_INTO_JAM, NOTHING, ask, has_friction, is_dry
 from crossbody.reference.core.layout import (
     BALLISTIC,
     FREE,
@@ -37,6 +37,8 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
     if s.frictional and s.standing > STANDSTILL + s.nc:  # ever sooner before a jam: what goes on is clear of it
         s.jam = s.jam or jams(K, s, m, w, b)
+    if s.frictional and _stops_in_a_jam(K, s, m, w, b):
+        return PAINLEVE
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
@@ -93,6 +95,23 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
         if slips:
             ask(BEGIN_SLIP, s, m, w, NOTHING)
     return jam
+
+
+@compiled
+def _stops_in_a_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Whether a contact whose slip comes to its end jams first, too slow for any step to see; it marks this one."""
+    nq, known, marks = s.nq, False, b.history[len(b.history) - 1]
+    for i in range(s.nc):
+        if not (w.hit[i] <= s.theta and m.tangents[i] > 1 and events.stops(s, m, w, i)):
+            continue
+        if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) != 0:
+            return False
+        known = True
+        if ask(DIES_INTO_JAM, s, m, w, i) > 0.0:
+            marks[:] = 0
+            marks[i] = 1
+            return True
+    return False
 
 
 @compiled

@@ -23,8 +23,8 @@ TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes ma
 
 (
     BEGIN, FACTOR, SOLVE, RESPOND, DETERMINANT, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS,
-    HOLDS_ON, BEGIN_SLIP, DECIDE, SETTLED, JAMS,
-) = np.arange(17)  # fmt: skip
+    HOLDS_ON, BEGIN_SLIP, DECIDE, SETTLED, JAMS, DIES_INTO_JAM,
+) = np.arange(18)  # fmt: skip
 NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun
 
 
@@ -138,7 +138,7 @@ def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
                 w.slides[t] = 1
                 w.law[t, 0], w.law[t, 1], w.law[t, 2] = 0.0, 0.0, 0.0
         else:
-            w.within[i] = np.inf
+            w.within[i], w.course[i] = np.inf, np.inf
             if has_begun(w, i):
                 count_from_none(m, w, i)
 

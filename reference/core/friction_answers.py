@@ -5,12 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from crossbody.reference.cache import compiled
-from crossbody.reference.core import cones, coulomb, jams, loops, mode_set, slips, sticking, turning, undetermined
+from crossbody.reference.core import (
+    cones,
+    coulomb,
+    jams,
+    loops,
+    mode_set,
+    slips,
+    sticking,
+    stops,
+    turning,
+    undetermined,
+)
 from crossbody.reference.core.friction import (
     BEGIN,
     BEGIN_SLIP,
     DECIDE,
     DETERMINANT,
+    DIES_INTO_JAM,
     FACTOR,
     HOLDS_ON,
     JAMS,
@@ -68,6 +80,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     BEGIN_SLIP      of contacts that have reached their bounds, there
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
     JAMS            how far the contact that slides nearest to a jam is from it; that of each into w.cones[i]
+    DIES_INTO_JAM   1 if contact i, whose slip dies out, jams before it is at rest
     SETTLED         follow what the law leaves open, where modes have settled
     """
     if what == FACTOR:
@@ -107,6 +120,8 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         return float(sticking.decide(s, m, w))
     elif what == SETTLED:
         undetermined.follow_shares(s, m, w, True)
+    elif what == DIES_INTO_JAM:
+        return 1.0 if stops.dies_into_jam(s, m, w, i) else 0.0
     elif what == JAMS:
         return float(jams.watch(s, m, w, w.cones[i]))
     elif what == BEGIN:

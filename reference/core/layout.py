@@ -38,7 +38,7 @@ OF_FRICTION = (
     "state", "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among",
     "seen", "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated",
     "turn_by", "bent", "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
-    "borne", "even", "known", "off_by",
+    "borne", "even", "known", "off_by", "course",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -381,6 +381,7 @@ class Work:
     bent: Floats  # by how much the direction of a sliding contact turns with the rate of its tangential row
     turning: Index  # their places
     turned: Index  # pivots
+    course: Floats  # (nc,) angle of a slip where it was last clear of zero, or first known; inf before
     within: Floats  # (nc,) instant since which a contact slides without a direction; inf for one that has one
     slid: Bytes  # contacts that slide before modes are decided
     left2: Floats  # bounds of sticking rows,

@@ -39,7 +39,7 @@ def begin(s: Any, m: Model, w: Work) -> None:
             w.decides[m.follows[i]] = 0
     for left in (w.way, w.rest, w.tolerated, w.open_v, w.open_rate):
         left[:] = 0.0
-    w.off[:], w.begins[:], w.since[:], w.within[:] = 0, 0, -np.inf, np.inf
+    w.off[:], w.begins[:], w.since[:], w.within[:], w.course[:] = 0, 0, -np.inf, np.inf, np.inf
 
 
 @compiled
@@ -51,10 +51,18 @@ def face(m: Model, w: Work, i: int, rate: Array) -> None:
 
 
 @compiled
+def angle(m: Model, w: Work, i: int, rate: Array) -> float:
+    """Return the angle of the slip velocity of contact i in its plane."""
+    t = m.tangent[i]
+    return float(np.arctan2(rate[t + 1] - m.drift[t + 1] - w.rest[t + 1], rate[t] - m.drift[t] - w.rest[t]))
+
+
+@compiled
 def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
     """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips.
 
-    What their bodies gain while a row returns to its law stands beside it: at rest speeds are those of errors.
+    What their bodies gain while a row returns to its law stands beside it: at rest speeds are those of errors. What
+    drives a row by speeds alone does not count: it vanishes there, and is large where a contact runs along an edge.
     """
     for i in range(s.nc):
         if has_friction(m, i):
@@ -63,7 +71,8 @@ def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
         i, size = w.idx[j], 0.0
         returns = max(m.alpha[i, 1], np.sqrt(m.alpha[i, 0])) if has_friction(m, i) else 0.0
         if returns > 0.0:
-            s.gained_speed = max(s.gained_speed, w.scale[j] / returns)
+            drive = w.scale[j] - abs(w.Hdv[j]) - w.law[i, 1] * abs(w.hda[j])
+            s.gained_speed = max(s.gained_speed, drive / returns)
         for c in range(m.span[i, 0], m.span[i, 1] if is_tangent(m, i) else 0):
             size += abs(w.H[j, c] * w.y[s.nq + c])
         s.slip_speed = max(s.slip_speed, size)
@@ -137,6 +146,8 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
                 face(m, w, i, rate)
             if m.tangents[i] > 1:
                 s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
+                if w.course[i] == np.inf or slip(m, w, i, rate) > CLEAR * small_slip(s):
+                    w.course[i] = angle(m, w, i, rate)
             if _lingers(s, m, w, i, rate):
                 w.hit[i], w.kind[i], linger = 0.0, STOP, True
     if s.na > 0 and s.dependent_rows > 0:

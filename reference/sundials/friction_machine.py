@@ -19,6 +19,7 @@ from crossbody.cases import Mode, Outcome
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.balance import Balance
+from crossbody.reference.sundials.dying import dies_into_jam
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.friction_alarms import Alarm, alarms
 from crossbody.reference.sundials.level_machine import LevelMachine, View
@@ -46,6 +47,7 @@ class FrictionMachine(LevelMachine):
         self.sliding = Sliding(system, equations, rtol)
         self.ways: dict[int, Floats] = {}
         self.begun: set[int] = set()
+        self.courses: dict[int, Floats] = {}  # directions of slips where these were last clear of zero
         self.alarms: list[Alarm] = []
         self.modes = [Mode(mode) for mode in initial_modes(system, *start).tolist()]
         self.rows = sorted({*self.rows, *self.sliding.dry})
@@ -141,6 +143,8 @@ class FrictionMachine(LevelMachine):
                     self.ways[i] = slip / size
                 if size > self.still:
                     self.begun.discard(i)
+                if size > self.still or i not in self.courses:
+                    self.courses[i] = slip / size
             waits = self.modes[i] == Mode.SLIP and size <= self.small and i not in self.begun
             self._waiting = {**self._waiting, i: self._waiting.get(i, t)} if waits else {
                 k: since for k, since in self._waiting.items() if k != i
@@ -215,6 +219,7 @@ class FrictionMachine(LevelMachine):
             self.modes[way] = after
         if after != Mode.SLIP:
             self.begun.discard(i)
+            self.courses.pop(i, None)
 
     def _meets(self, i: int, gap: Floats, rate: Floats, q: Floats) -> bool:
         """Whether an open contact stands where it may press: at its surface, or below it from the start on."""
@@ -287,10 +292,29 @@ class FrictionMachine(LevelMachine):
         above: Floats = (seen.G[..., k, others] * lam).sum(axis=-1) - seen.bare[..., k] + 2.0 * self._limit
         return above
 
+    def _watch_jams(self, t: float, q: Floats, v: Floats, fired: list[Alarm]) -> None:
+        """End where a contact jams whose slip dies out, or whose force changes its sign through infinity.
+
+        Raises:
+            Ended: PAINLEVE, naming the row.
+        """
+        ends = [a for a in fired if a.tells in ("STOP", "JAM", "RELEASE") and self.modes[a.row] == Mode.SLIP]
+        ends = [a for a in ends if a.row not in self.sliding.dry]
+        if not ends:
+            return
+        seen, balance = self.weigh(t, q, v)
+        slow = [i for i in balance.ways if np.linalg.norm(self.sliding.slip(seen, i)) <= self.still]
+        modes = {i: self.modes[i] for i in self.contacts()}
+        for i in (a.row for a in ends):
+            alone = slow == [i] and len(self.sliding.ways[i]) > 1 and i not in self.begun
+            if alone and dies_into_jam(self.sliding, seen, modes, balance.ways, i, self.courses.get(i, self.ways[i])):
+                raise Ended(Outcome.PAINLEVE, [i])
+
     def apply(self, t: float, q: Floats, v: Floats, fired: list[Alarm]) -> None:
         """Note what fired; `settle` decides what follows from it."""
         gap, rate = (a.copy() for a in self.equations.gaps(t, q, v))
         self._jump = False
+        self._watch_jams(t, q, v, fired)
         for alarm in fired:
             i, tells = alarm.row, alarm.tells
             if tells == "JAM":
