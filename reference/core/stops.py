@@ -39,9 +39,15 @@ def _distance(s: Any, m: Model, w: Work, i: int, at: float) -> float:
 
 @compiled
 def _across(s: Any, m: Model, w: Work, i: int) -> float:
-    """How fast the slip of contact i is accelerated across the direction for which rows were last factored."""
+    """How fast the slip of contact i is accelerated across the direction for which rows were last factored.
+
+    It is 0 where a contact would pull: it lets go on the way, and what follows is another set's.
+    """
     c, total = w.listed[m.tangent[i]], 0.0
     respond(s, m, w, w.pushed, w.la)
+    for j in range(s.na):
+        if m.unilateral[w.idx[j]] and m.follows[w.idx[j]] < 0 and w.la[j] < 0.0:
+            return 0.0
     for side in range(2):
         acceleration = -w.pushed[c + side]
         for k in range(s.na):

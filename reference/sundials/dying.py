@@ -42,9 +42,12 @@ def dies_into_jam(
     clear = np.prod(balance.jam(i), axis=-1).real > 0.0
     if clear.all() or not clear[0]:
         return False
-    moved = (seen.G @ balance.forces()[..., None])[..., 0] - seen.bare
+    lam = balance.forces()
+    moved = (seen.G @ lam[..., None])[..., 0] - seen.bare
     x, y = (moved[:, seen.at[t]] for t in sliding.ways[i])
     across = way[:, 0] * y - way[:, 1] * x
     order = np.arange(AROUND) if across[0] > 0.0 else -np.arange(AROUND)
+    pressing = lam[:, [seen.at[k] for k in modes if k not in sliding.dry]]
     ends = ~clear[order] | (across[order] * across[0] <= 0.0)
+    ends |= pressing.min(axis=1)[order] < 0.0  # it lets go on the way, and what follows is another set's
     return bool(ends.any() and not clear[order][np.argmax(ends)])
