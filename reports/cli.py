@@ -84,7 +84,7 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option(
     "--set-engine", "settings", metavar="[E[:PROFILE].]K=V", multiple=True,
-    help="Setting of one engine, or of all engines that have it; repeatable.",
+    help="Setting of one engine, or of all engines that have it; repeatable.", shell_complete=options.settings_of,
 )  # fmt: skip
 @click.option("--dry-run", "dry", is_flag=True, help="Show what would be run, without running it.")
 @click.option("--strict", is_flag=True, help="Exit code 1 also if a number has left its regression band.")
@@ -463,8 +463,9 @@ def _drop_what_cannot_be_printed() -> None:
 
 
 def _say(text: str, code: int = 2) -> int:
-    with suppress(OSError):  # the code tells where stderr cannot
-        click.echo(folded(f"crossbody: {text}"), err=True)
+    line = f"crossbody: {' '.join(text.split())}"
+    with suppress(OSError):  # the code tells where stderr cannot; a program that reads it finds one line
+        click.echo(folded(line) if sys.stderr.isatty() else line, err=True)
     return code
 
 

@@ -47,8 +47,8 @@ def show(rows: Sequence[Row], times: Times) -> None:
         shown = table(runs, times, layout.columns())
         click.echo(f"{layout.told(sentence(runs))}\n\n{shown}\n\n{counted(rows)}")
     for run in runs:
-        for row in run.wrong:
-            click.echo(layout.told(_wrong(run, row)))
+        for text in wrong(run):
+            click.echo(layout.told(text))
     for run in runs:
         for row in (row for row in run.rows if row["regression"] == Regression.LOST):
             click.echo(layout.told(_lost(run, row)))
@@ -107,10 +107,20 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
 
 
+def wrong(run: EngineRun) -> list[str]:
+    """Say what is wrong with a run: one sentence if it did not finish, else one for each number."""
+    if (row := run.failed) is None:
+        return [_wrong(run, row) for row in run.wrong]
+    rest = len(run.wrong) - 1
+    more = f" {rest} numbers that this makes wrong are in the report." if rest else ""
+    return [f"{row['verdict']}: {run.label} {run.who} did not finish. {row['why']}{more}"]
+
+
 def _wrong(run: EngineRun, row: Row) -> str:
     number = ""
     if row["verdict"] == Word.OUTSIDE:
-        number = f" {row['value']:.4g}{unit_text(row['unit'])}, limit {row['limit']:.4g}"
+        number = " has no number" if math.isnan(row["value"]) else f" {row['value']:.4g}{unit_text(row['unit'])}"
+        number += "" if math.isnan(row["limit"]) else f", limit {row['limit']:.4g}"
     place = f" ({row['where']})" if row.get("where") else ""
     return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}{place}. {row['why']}"
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
@@ -50,7 +51,7 @@ def plain(text: str) -> str:
     return text.replace("<", "&lt;")
 
 
-def coded(array: Floats) -> dict[str, str]:
+def coded(array: Floats | NDArray[np.float32]) -> dict[str, str]:
     """An array as plotly reads it from base64 ("typed array specification")."""
     text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
     shape = {"shape": ",".join(map(str, array.shape))} if array.ndim > 1 else {}

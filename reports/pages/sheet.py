@@ -84,7 +84,8 @@ class Sheet:
             "line": {key: look[key] for key in ("color", "dash", "width")} | more,
             "opacity": 0.65 if label(trace) == TRUTH else 1.0,
         }  # fmt: skip
-        self.lines.append((row, y[at].astype(np.float32), line))
+        with np.errstate(over="ignore"):  # what is larger than any plot shows is a gap
+            self.lines.append((row, y[at].astype(np.float32), line))
 
     def done(self) -> dict[str, Any]:
         """The figure."""
@@ -92,7 +93,8 @@ class Sheet:
         axes, height = self._axes(drawn)
         place = {row: number(i + 1) for i, row in enumerate(drawn)}
         data = [
-            line | {"y": coded(_short(y) if row in self.decades else y)}
+            line
+            | {"y": coded(_short(y) if row in self.decades else y)}
             | {"xaxis": f"x{place[row]}", "yaxis": f"y{place[row]}"}
             for row, y, line in self.lines
         ]
