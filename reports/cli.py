@@ -1,7 +1,7 @@
 """The command `crossbody`.
 
 Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2:
-wrong use, told in one sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130:
+wrong use, reported in one sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130:
 interrupted. Whatever is not needed to read the command line is imported by the command that needs it.
 """
 
@@ -106,7 +106,7 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     if dry:
         words = ("names", "wanted", "variant", "pairs", "rtol", "settings", "out", "against", "others", "limit")
         return _do("planned.tell", **{name: asked[name] for name in words})
-    from crossbody.reports.runs import choice  # wrong words are told before all else is imported
+    from crossbody.reports.runs import choice  # wrong words are reported before all else is imported
 
     given = choice.parse_settings(asked["pairs"])
     cases = choice.load_cases(asked["names"], asked.pop("variant"), given, asked["limit"])
@@ -419,7 +419,7 @@ def main(arguments: list[str] | None = None) -> None:
 def _obey(arguments: list[str] | None) -> int:
     try:
         code = cli.main(args=arguments, prog_name="crossbody", standalone_mode=False)
-        sys.stdout.flush()  # what cannot be written is told, not lost with the process
+        sys.stdout.flush()  # what cannot be written is reported, not lost with the process
     except (click.exceptions.Abort, KeyboardInterrupt):
         return 130
     except click.ClickException as error:

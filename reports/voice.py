@@ -153,7 +153,7 @@ def told_as_json(tables: Mapping[str, pd.DataFrame]) -> bool:
 
 @contextmanager
 def progress(steps: int | None, done: int | None = None) -> Iterator[Callable[[str], None]]:
-    """Show a bar on stderr with the time left, advanced each time it is told what is being done, or was.
+    """Show a bar on stderr with the time left, advanced each time it is called with what is being done, or was.
 
     Args:
         steps: how many in all; None where nobody knows.

@@ -1,4 +1,4 @@
-"""How an engine looks in plots and tables; how plotly is told texts, arrays, axes, plots in a grid."""
+"""How an engine looks in plots and tables; how plotly is given texts, arrays, axes, plots in a grid."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from crossbody.reports.figures.section import Figure
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 
-# Okabe and Ito's colours: told apart by colour-blind readers, on light and on dark.
+# Okabe and Ito's colours: distinguished by colour-blind readers, on light and on dark.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00", "#7F7FFF", "#9B59D0")
 DASHES = ("solid", "dash", "dot", "dashdot")
 STROKES = {"solid": "none", "dash": "7 4", "dot": "2 3", "dashdot": "7 3 2 3"}
@@ -32,7 +32,7 @@ def label(trace: Trace) -> str:
 def style(trace: Trace, i: int) -> dict[str, Any]:
     """Colour, dash and width of the trace at place i of a case; the truth is a broad grey line.
 
-    The place among all engines of a folder, where one is told, goes first: an engine looks the same on every page.
+    The place among all engines of a folder, where one is given, goes first: an engine looks the same on every page.
     """
     if label(trace) == TRUTH:
         return {"color": "#888888", "dash": "solid", "width": 4, "strokes": "none"}

@@ -150,7 +150,7 @@ def _off(run: EngineRun, row: Row) -> str:
 
 
 def _blamed(run: EngineRun, metric: str) -> str:
-    """The part that is more than half of an error, where its parts are told."""
+    """The part that is more than half of an error, where its parts are known."""
     values = {row["metric"]: abs(row["value"]) for row in run.rows if row["value"] is not None}
     most = [part for part in PARTS if values.get(part_of(metric, part), 0.0) > 0.5 * values.get(metric, math.nan)]
     return f", mostly its {' and '.join(most)}" if most else ""
