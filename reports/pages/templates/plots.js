@@ -27,7 +27,7 @@
     }
     for (const key of axes(out)) if (key[0] === "y") out[key] = { ...out[key], automargin: true }; // titles beside long ticks
     if (innerWidth < 600) {
-      out.margin = { ...out.margin, l: 58, r: 6 };
+      out.margin = { ...out.margin, l: 58, r: 6, t: out.showlegend === false ? 10 : out.margin.t }; // no buttons there
       out.font = { ...out.font, size: 10 };
       for (const key of axes(out)) {
         if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
@@ -130,9 +130,9 @@
       if (!("beside" in over.dataset)) continue;
       const lines = box.data.filter((line) => own(line) && (line.yaxis || "y") === key);
       const ends = lines.map((line) => [line, left(line, x, y)]).filter(([, at]) => at).sort(([, a], [, b]) => a[1] - b[1]);
-      spread(ends.map(([, at]) => at[1] + TALL / 2), y._length + TALL).forEach((middle, k) => {
+      spread(ends.map(([, at]) => at[1]), y._length).forEach((middle, k) => {
         const [{ title, line: { color } }, at] = ends[k];
-        const [there, height] = [right + ROOM, y._offset + middle - TALL / 2];
+        const [there, height] = [right + ROOM, y._offset + middle];
         const text = drawing("text", { x: there + 3, y: height + 4 }, title);
         text.style.setProperty("--of", color);
         over.append(drawing("path", { d: `M${x._offset + at[0]} ${y._offset + at[1]}L${there} ${height}`, stroke: color }), text);
