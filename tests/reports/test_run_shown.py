@@ -137,7 +137,8 @@ def test_a_run_that_failed_is_one_sentence_and_one_entry(why: str, capsys: pytes
     said = capsys.readouterr().out
     folded = " ".join(said.split())
     assert said.count("outside: ") == 1
-    assert f"outside: ball:v mujoco:matched did not finish. {' '.join(why.split())} 2 numbers" in folded
+    assert f"outside: ball:v mujoco:matched did not finish. {' '.join(why.split())} The report" in folded
+    assert "the 2 numbers that this makes wrong; a shorter --t-end" in folded
     assert "Off: mujoco:matched on ball:v (did not finish)." in folded
     assert "nan W" not in said
     assert "limit nan" not in said
@@ -149,6 +150,15 @@ def test_a_number_that_is_none_is_not_written_as_one(capsys: pytest.CaptureFixtu
     said = " ".join(capsys.readouterr().out.split())
     assert "outside: ball:v mujoco:matched friction_power has no number. the reason" in said
     assert "outside: ball:v mujoco:matched x has no number, limit 1e-06. the reason" in said
+
+
+@pytest.mark.parametrize("place", range(60))
+def test_a_number_stays_with_its_unit_and_limit(place: int, capsys: pytest.CaptureFixture[str]) -> None:
+    run_shown.show([row("mujoco", "x" * (place + 1), 4.56e-4, Word.OUTSIDE, 1e-5) | {"unit": "kg m^2/s"}], {})
+    said = capsys.readouterr().out
+    assert "0.000456 kg m^2/s" in said
+    assert "limit 1e-05" in said
+    assert layout.NO_BREAK not in said
 
 
 @given(st.lists(st.text("abc:/_-.0123456789", min_size=1, max_size=100), min_size=1, max_size=60))
