@@ -37,7 +37,7 @@ def style(trace: Trace, i: int) -> dict[str, Any]:
     if label(trace) == TRUTH:
         return {"color": "#888888", "dash": "solid", "width": 4, "strokes": "none"}
     i = trace.about.get("place", i)
-    dash = DASHES[(i + i // len(COLOURS)) % len(DASHES)]  # like colours come with other dashes
+    dash = DASHES[(i + 2 * (i // len(COLOURS))) % len(DASHES)]  # like colours come with other dashes
     return {"color": COLOURS[i % len(COLOURS)], "dash": dash, "width": 1.8, "strokes": STROKES[dash]}
 
 

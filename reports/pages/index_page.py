@@ -119,8 +119,7 @@ def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], 
 
 
 def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> Section:
-    every = [row for rows in found.rows.values() for row in rows]
-    shown = grid.names([row for row in every if row["verdict"] != Word.SKIPPED] or every)  # the next table has all
+    shown = grid.names(row for rows in found.rows.values() for row in rows)
     return Section(
         name="matrix", title="Cases", template="matrix.html",
         context={

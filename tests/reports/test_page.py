@@ -355,18 +355,6 @@ def test_what_is_farthest_out_stands_first(out: Path) -> None:
     assert order == sorted(order, reverse=True)
 
 
-def test_what_ran_nowhere_has_no_column_on_the_index(tmp_path: Path) -> None:
-    ran, skipped = fake_rows(2), [
-        row | {"engine": "absent", "verdict": Word.SKIPPED, "why": "It is not installed."} for row in fake_rows(2)[:1]
-    ]  # fmt: skip
-    text = (made(tmp_path / "out", [], [*ran, *skipped]) / "index.html").read_text()
-    matrix = text[text.index('class="matrix"') : text.index('id="index--engines"')]
-    assert "absent" not in matrix
-    assert "absent" in text[text.index('id="index--engines"') :]
-    alone = (made(tmp_path / "alone", [], skipped) / "index.html").read_text()
-    assert "absent" in alone[alone.index('class="matrix"') :]
-
-
 def test_engines_look_different(result: CaseResult) -> None:
     trace = next(one for one in study.traces(result) if one.truth is not None)
     each = [replace(trace, about=dict(trace.about) | {"place": i}) for i in range(len(COLOURS) * len(DASHES))]
