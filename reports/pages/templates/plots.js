@@ -53,9 +53,10 @@
     return i;
   };
   const entitle = (lines) => { // one that ends before the others says when
-    const ends = lines.map((line) => line.x[last(line)]).filter(Number.isFinite);
+    const ends = lines.map((line) => line.x[last(line)]);
+    const end = Math.max(...ends.filter(Number.isFinite));
     lines.forEach((line, i) => {
-      line.title = line.name.replaceAll("&lt;", "<") + (ends[i] < 0.99 * Math.max(...ends) ? ` until ${Number(ends[i].toPrecision(3))} s` : "");
+      line.title = line.name.replaceAll("&lt;", "<") + (ends[i] < 0.99 * end ? ` until ${Number(ends[i].toPrecision(3))} s` : "");
     });
   };
   const below = (box, lines) => {
@@ -65,6 +66,7 @@
     new Map(lines.map((line) => [line.name, line])).forEach(({ name, meta, line: { color, dash } }) => {
       const one = document.createElement("span");
       one.dataset.line = meta;
+      one.hidden = !crossbody.shown(meta);
       const mark = drawing("path", { d: "M0 3H20", stroke: color, "stroke-dasharray": STROKES[dash] || "none" });
       one.append(drawing("svg", { width: 20, height: 6 }, mark), name.replaceAll("&lt;", "<"));
       key.append(one);
