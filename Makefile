@@ -3,7 +3,7 @@
 # make strict the main job, failing too where a number left its regression band; make bands stores the bands anew
 # make faults plant faults in a copy of the sources and see whether runs and tests fail (JOBS=2: two at a time)
 # make speed  measure the tables of docs/explanation/speed.md anew, about twenty minutes on a machine that does nothing else
-# make walkers  measure the table of walking robots in docs/explanation/contacts.md anew, some minutes
+# make walkers  measure the tables of walking robots in docs/explanation/contacts.md and the README anew, some minutes
 # make docs   build the pages into build/docs; a broken link is an error
 PYTHON ?= $(firstword $(shell command -v python3.11 python3.12 python3.13 python3 2>/dev/null))
 VENV ?= .venv

@@ -101,7 +101,7 @@ def save(figure: plt.Figure, to: str | Path = "figure.svg") -> None:
     figure.savefig(to, metadata={"Date": None})
     plt.close(figure)
     if Path(to).suffix == ".svg":  # hundredths of a point are enough in tags
-        short = r"<!--.*?-->|(?<=\d\.\d\d)\d+(?=[^<>]*>)|^ +"
+        short = r"<!--.*?-->|(?<=\d\.\d\d)\d+(?=[^<>]*>)|^ +|; stroke-linecap: square| transform=\"rotate\(-0 [^\"]*\""
         text = re.sub(short, "", Path(to).read_text(encoding="utf-8"), flags=re.MULTILINE)
         Path(to).write_text(re.sub(r"\n+", "\n", text), encoding="utf-8")
 

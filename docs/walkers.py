@@ -1,4 +1,4 @@
-"""The table of walking robots in docs/explanation/contacts.md, measured: `make walkers` writes it anew, in minutes.
+"""The tables of walking robots in docs/explanation/contacts.md and the README, measured anew by `make walkers`.
 
 The robots are the files of gymnasium's wheel, under motors whose controls are drawn once (seed 0) and held as long as
 gymnasium holds an action.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -24,6 +25,9 @@ from crossbody.reports.runs.choice import picks
 from crossbody.reports.runs.jobs import run_case
 
 PAGE = Path(__file__).parent / "explanation" / "contacts.md"
+README = Path(__file__).parent.parent / "README.md"
+HEADLINE = {"hopper.xml", "walker2d.xml", "humanoid.xml"}
+"""Robots in the README."""
 HELD = {"hopper": 0.008, "half_cheetah": 0.05, "ant": 0.05, "walker2d": 0.008, "humanoid": 0.015}
 """Robot -> how long gymnasium holds an action, s."""
 T_END, BUDGET = 1.0, 60.0
@@ -38,6 +42,14 @@ def main() -> None:
     print(table)
     if not sys.argv[1:]:
         PAGE.write_text(replaced(PAGE.read_text(encoding="utf-8"), {"walkers": table}), encoding="utf-8")
+        README.write_text(replaced(README.read_text(encoding="utf-8"), {"walkers": headline(rows)}), encoding="utf-8")
+
+
+def headline(rows: Iterable[tuple[object, ...]]) -> str:
+    """Lay out the table of the README: some robots, and what says most of each."""
+    head = ("Robot", "Truth known for", "Error of MuJoCo", "of its model", "of its step")
+    told = {str(robot).strip("`"): (robot, until, *errors) for robot, until, _, _, *errors in rows}
+    return markdown(head, [row for name, row in told.items() if name in HEADLINE])
 
 
 def row_of(name: str) -> tuple[object, ...]:

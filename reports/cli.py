@@ -1,7 +1,7 @@
 """The command `crossbody`.
 
 Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2:
-wrong use, told in one sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130:
+wrong use, reported in one sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130:
 interrupted. Whatever is not needed to read the command line is imported by the command that needs it.
 """
 
@@ -84,7 +84,7 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 @click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option(
     "--set-engine", "settings", metavar="[E[:PROFILE].]K=V", multiple=True,
-    help="Setting of one engine, or of all engines that have it; repeatable.",
+    help="Setting of one engine, or of all engines that have it; repeatable.", shell_complete=options.settings_of,
 )  # fmt: skip
 @click.option("--dry-run", "dry", is_flag=True, help="Show what would be run, without running it.")
 @click.option("--strict", is_flag=True, help="Exit code 1 also if a number has left its regression band.")
@@ -106,7 +106,7 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     if dry:
         words = ("names", "wanted", "variant", "pairs", "rtol", "settings", "out", "against", "others", "limit")
         return _do("planned.tell", **{name: asked[name] for name in words})
-    from crossbody.reports.runs import choice  # wrong words are told before all else is imported
+    from crossbody.reports.runs import choice  # wrong words are reported before all else is imported
 
     given = choice.parse_settings(asked["pairs"])
     cases = choice.load_cases(asked["names"], asked.pop("variant"), given, asked["limit"])
@@ -419,7 +419,7 @@ def main(arguments: list[str] | None = None) -> None:
 def _obey(arguments: list[str] | None) -> int:
     try:
         code = cli.main(args=arguments, prog_name="crossbody", standalone_mode=False)
-        sys.stdout.flush()  # what cannot be written is told, not lost with the process
+        sys.stdout.flush()  # what cannot be written is reported, not lost with the process
     except (click.exceptions.Abort, KeyboardInterrupt):
         return 130
     except click.ClickException as error:
@@ -463,8 +463,9 @@ def _drop_what_cannot_be_printed() -> None:
 
 
 def _say(text: str, code: int = 2) -> int:
-    with suppress(OSError):  # the code tells where stderr cannot
-        click.echo(folded(f"crossbody: {text}"), err=True)
+    line = f"crossbody: {' '.join(text.split())}"
+    with suppress(OSError):  # the code tells where stderr cannot; a program that reads it finds one line
+        click.echo(folded(line) if sys.stderr.isatty() else line, err=True)
     return code
 
 

@@ -16,7 +16,8 @@ import click
 if TYPE_CHECKING:
     import pandas as pd
 
-WIDTH = 120  # of a table in a file or a pipe
+WIDTH, SENTENCE = 120, 80  # of a table and of sentences in a file or a pipe
+NO_BREAK = "\u00a0"
 NOTHING = {"-", ""}
 """Cells that say nothing."""
 UNITS = {"ms": "[ms]", "s": "[s]"}
@@ -29,10 +30,13 @@ def columns() -> int:
 
 
 def told(text: str, indent: int = 4) -> str:
-    """Return a sentence; on a terminal folded to its width, and indented from its second line on."""
-    if not sys.stdout.isatty():
-        return text
-    return textwrap.fill(text, columns(), subsequent_indent=" " * indent, break_on_hyphens=False)
+    """Return a sentence in lines that fit the terminal, else 80 columns, indented from the second; no word is cut.
+
+    What `NO_BREAK` joins stays in one line.
+    """
+    width = columns() if sys.stdout.isatty() else SENTENCE
+    lines = textwrap.fill(text, width, subsequent_indent=" " * indent, break_on_hyphens=False, break_long_words=False)
+    return lines.replace(NO_BREAK, " ")
 
 
 def unit_text(unit: str, form: str = " {}") -> str:

@@ -118,15 +118,15 @@ def silent() -> bool:
 
 
 def note(text: str) -> None:
-    """Say something beside the result, in one line on stderr."""
+    """Say something beside the result, on stderr."""
     if not silent():
         print(folded(f"crossbody: {text}"), file=sys.stderr)
 
 
 def folded(text: str) -> str:
-    """Return a sentence in one line; on a terminal in lines of 80 columns."""
+    """Return a sentence in lines of 80 columns; words stay."""
     line = " ".join(text.split())
-    return textwrap.fill(line, 80, subsequent_indent="    ", break_on_hyphens=False) if sys.stderr.isatty() else line
+    return textwrap.fill(line, 80, subsequent_indent="    ", break_on_hyphens=False, break_long_words=False)
 
 
 def rows_as_json(rows: pd.DataFrame) -> str:
@@ -153,7 +153,7 @@ def told_as_json(tables: Mapping[str, pd.DataFrame]) -> bool:
 
 @contextmanager
 def progress(steps: int | None, done: int | None = None) -> Iterator[Callable[[str], None]]:
-    """Show a bar on stderr with the time left, advanced each time it is told what is being done, or was.
+    """Show a bar on stderr with the time left, advanced each time it is called with what is being done, or was.
 
     Args:
         steps: how many in all; None where nobody knows.

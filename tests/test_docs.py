@@ -12,6 +12,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -90,6 +91,14 @@ def test_every_how_to_page_has_its_figure_and_the_command_that_draws_it() -> Non
         assert re.search(rf"!\[[^]]+\]\((\.\./)?figures/{name}\.svg\)", text), name
         assert f"Drawn by `python docs/picture.py {name}`." in text
         assert (DOCS / "figures" / f"{name}.svg").stat().st_size < 60_000
+
+
+def test_what_is_installed_is_justified_in_one_place() -> None:
+    """Each package of the base installation stands in its table, and nothing else does."""
+    needed = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    rows = re.findall(r"^\| ([^|]+) \| \d+ \| [^|]+ \|$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE)
+    named = {name.lower() for row in rows for name in row.replace(" with ", " ").split(", ")}
+    assert named - {"llvmlite"} == {re.split(r"[<>=~]", one)[0] for one in needed}
 
 
 @pytest.mark.parametrize("page", RUN)

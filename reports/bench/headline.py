@@ -70,7 +70,7 @@ def _failed(finest: pd.Series[Any]) -> str:
 
 
 def _level(ours: pd.DataFrame, rung: Mapping[Any, Any]) -> dict[str, Any]:
-    """The reference's cheapest run at least as accurate as one rung, as far as that can be told."""
+    """The reference's cheapest run at least as accurate as one rung, as far as that is known."""
     error = max(float(rung["error"]), FLOOR, float(rung["known_to"]))
     found = {
         "knob": rung["knob"], "setting": rung["setting"], "best_error": float(rung["error"]),

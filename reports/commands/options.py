@@ -6,6 +6,7 @@ import math
 import shlex
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
@@ -41,12 +42,49 @@ def names_of(*modules: str) -> Callable[[click.Context, click.Parameter, str], l
     return fitting
 
 
+def _given(context: click.Context) -> list[str]:
+    """Return the cases that stand before what a shell completes; files of users' own among them."""
+    from crossbody import cases
+    from crossbody.cases.loading import OF_USERS, parted
+
+    words = (*context.args, *(context.params.get("names") or ()), context.params.get("name") or "")
+    return [word for word in words if parted(word)[0] in cases.names() or word.endswith(OF_USERS)]
+
+
 def variants_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
     """Return what a shell completes to variants of the cases that stand before it."""
     from crossbody import cases
 
-    given = [word for word in context.args if word in cases.names()]
-    return [CompletionItem(variant) for name in given for variant in cases.variants(name) if variant.startswith(begun)]
+    return [CompletionItem(one) for name in _given(context) for one in cases.variants(name) if one.startswith(begun)]
+
+
+def parameters_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Return what a shell completes to parameters of the cases that stand before it."""
+    from crossbody.cases import CrossbodyError, loading
+
+    found: dict[str, str] = {}
+    with suppress(CrossbodyError):
+        for name in _given(context) or ["bouncing_ball"]:
+            found |= {key: one.doc for key, one in loading.module(loading.parted(name)[0]).PARAMETERS.items()}
+    return [CompletionItem(f"{name}=", help=doc) for name, doc in found.items() if name.startswith(begun)]
+
+
+def settings_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Return what a shell completes to settings of the engines that are asked for, or of those that are installed."""
+    from crossbody import cases, engines
+    from crossbody.reports.runs.choice import DEFAULT_ENGINES, parse_engine
+
+    found: dict[str, None] = {}
+    wanted = context.params.get("wanted") or [one for one in DEFAULT_ENGINES if one in engines.names()]
+    for name, profile in map(parse_engine, wanted):
+        if not (begun.startswith(f"{name}.") or name.startswith(begun)):
+            continue  # an engine takes long to import
+        with suppress(cases.CrossbodyError):
+            case, engine = cases.load((_given(context) or ["bouncing_ball"])[0]), engines.load(name)
+            for each in (profile,) if profile else engine.profiles:
+                with suppress(cases.CaseUnsupported):
+                    found |= dict.fromkeys(f"{name}.{key}=" for key in engine.planned(case, each))
+    return [CompletionItem(name) for name in found if name.startswith(begun)]
 
 
 class _Positive(click.FloatRange):
@@ -130,7 +168,8 @@ def parameters(command: _Work) -> _Work:
     taking: Any = gathered
     found: _Work = together(
         taking,
-        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable."),
+        click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.",
+                     shell_complete=parameters_of),
         click.option("--t-end", type=float, metavar="S", help="Horizon, s; same as --set t_end=S."),
         click.option("--law", metavar="a0=,a1=", help="Constants of all rows; same as --set for each constant."),
         click.option("--ctrl", metavar="FILE", help="Robot file: table of controls (CSV, Parquet, NPZ)."),

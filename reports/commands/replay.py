@@ -46,7 +46,7 @@ SPARED = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
-    """What both commands are told about a log.
+    """What both commands are given about a log.
 
     Attributes:
         path, columns, part, repair: as for `hw.read`.
@@ -77,7 +77,7 @@ class Ask:
 
 
 def _ended(model: str, engine: str) -> bool:
-    """Whether an engine's process was ended, as it was told what it did."""
+    """Whether an engine's process was ended, by what was reported of it."""
     return any(label.startswith((f"{model} on {engine}:", f"{model} on {engine},")) for label in watch.all_lost())
 
 

@@ -67,7 +67,7 @@ def run(
         clock.append(perf_counter())
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
-            # Pages take longer than all but the engines: what they show is told before them, and lost by nothing.
+            # Pages take longer than all but the engines: what they show is printed before them, and lost by nothing.
             untold = _tell(rows, made, controlled=any(case.control is not None for case in cases))
             clock.append(perf_counter())
             from crossbody.reports.pages import site  # after the verdicts: templates take longer to import than to fill

@@ -13,7 +13,7 @@ from crossbody.reports import layout, voice
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, beyond, runs_of, sentence
 from crossbody.reports.judging.verdict import Regression, Row, Word
-from crossbody.reports.layout import unit_text
+from crossbody.reports.layout import NO_BREAK, unit_text
 from crossbody.reports.pages.results import Times
 
 MANY = 4  # cases that are named of those that an engine could not run
@@ -45,10 +45,10 @@ def show(rows: Sequence[Row], times: Times) -> None:
     runs = runs_of(rows)
     if not voice.quiet():
         shown = table(runs, times, layout.columns())
-        click.echo(f"{layout.told(sentence(runs))}\n\n{shown}\n\n{counted(rows)}")
+        click.echo(f"{layout.told(sentence(runs))}\n\n{shown}\n\n{layout.told(counted(rows))}")
     for run in runs:
-        for row in run.wrong:
-            click.echo(layout.told(_wrong(run, row)))
+        for text in wrong(run):
+            click.echo(layout.told(text))
     for run in runs:
         for row in (row for row in run.rows if row["regression"] == Regression.LOST):
             click.echo(layout.told(_lost(run, row)))
@@ -107,10 +107,22 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
 
 
+def wrong(run: EngineRun) -> list[str]:
+    """Say what is wrong with a run: one sentence if it did not finish, else one for each number."""
+    if (row := run.failed) is None:
+        return [_wrong(run, row) for row in run.wrong]
+    rest = len(run.wrong) - 1
+    more = f" and the {rest} numbers that this makes wrong" if rest else ""
+    do = f"The report has its motion up to there{more}; a shorter --t-end judges it up to there."
+    return [f"{row['verdict']}: {run.label} {run.who} did not finish. {row['why']} {do}"]
+
+
 def _wrong(run: EngineRun, row: Row) -> str:
     number = ""
     if row["verdict"] == Word.OUTSIDE:
-        number = f" {row['value']:.4g}{unit_text(row['unit'])}, limit {row['limit']:.4g}"
+        size = f"{row['value']:.4g}{unit_text(row['unit'])}".replace(" ", NO_BREAK)
+        number = " has no number" if math.isnan(row["value"]) else f" {size}"
+        number += "" if math.isnan(row["limit"]) else f", limit{NO_BREAK}{row['limit']:.4g}"
     place = f" ({row['where']})" if row.get("where") else ""
     return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}{place}. {row['why']}"
 

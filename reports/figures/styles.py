@@ -1,4 +1,4 @@
-"""How an engine looks in plots and tables; how plotly is told texts, arrays, axes, plots in a grid."""
+"""How an engine looks in plots and tables; how plotly is given texts, arrays, axes, plots in a grid."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 
-# Okabe and Ito's colours: told apart by colour-blind readers, on light and on dark.
+# Okabe and Ito's colours: distinguished by colour-blind readers, on light and on dark.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00", "#7F7FFF", "#9B59D0")
 DASHES = ("solid", "dash", "dot", "dashdot")
 STROKES = {"solid": "none", "dash": "7 4", "dot": "2 3", "dashdot": "7 3 2 3"}
@@ -31,12 +32,12 @@ def label(trace: Trace) -> str:
 def style(trace: Trace, i: int) -> dict[str, Any]:
     """Colour, dash and width of the trace at place i of a case; the truth is a broad grey line.
 
-    The place among all engines of a folder, where one is told, goes first: an engine looks the same on every page.
+    The place among all engines of a folder, where one is given, goes first: an engine looks the same on every page.
     """
     if label(trace) == TRUTH:
         return {"color": "#888888", "dash": "solid", "width": 4, "strokes": "none"}
     i = trace.about.get("place", i)
-    dash = DASHES[i % len(DASHES)]
+    dash = DASHES[(i + 2 * (i // len(COLOURS))) % len(DASHES)]  # like colours come with other dashes
     return {"color": COLOURS[i % len(COLOURS)], "dash": dash, "width": 1.8, "strokes": STROKES[dash]}
 
 
@@ -50,7 +51,7 @@ def plain(text: str) -> str:
     return text.replace("<", "&lt;")
 
 
-def coded(array: Floats) -> dict[str, str]:
+def coded(array: Floats | NDArray[np.float32]) -> dict[str, str]:
     """An array as plotly reads it from base64 ("typed array specification")."""
     text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
     shape = {"shape": ",".join(map(str, array.shape))} if array.ndim > 1 else {}

@@ -65,7 +65,7 @@ def _about(axis: Floats, angle: float) -> Floats:
 
 
 class _Rewriting:
-    """One MJCF: what its compiler is told of angles, and what its classes say."""
+    """One MJCF: what its compiler is given about angles, and what its classes say."""
 
     def __init__(self, root: Node) -> None:
         settings = {key: value for one in root.iter("compiler") for key, value in one.attrib.items()}

@@ -541,7 +541,7 @@ def _split(judge_: _Judge, wholes: Mapping[str, float]) -> Iterator[Verdict]:
 
 
 def _unlike(judge_: _Judge, name: str, found: Split, whole: float) -> Iterator[Verdict]:
-    """What parts add up to, where that is not the whole error: they are told one from the other by other code.
+    """What parts add up to, where that is not the whole error: other code separates them.
 
     Parts of instants may be more, where what brings an event about comes near zero slowly (`measuring.instants`).
     """

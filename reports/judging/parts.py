@@ -35,11 +35,11 @@ from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.metrics.position import scale_of
 
 PARTS = ("importer", "model", "step")
-SPLIT = ("position", "event_times")  # metrics whose error is told apart
+SPLIT = ("position", "event_times")  # metrics whose error is split
 RATIO = 2.0  # of one step of a study to the next
 FLAT = 1e-10  # differences of runs below it, relative, are rounding that has added up: they show no order
 LEAST_RATIO = 2.0**0.5
-"""Of the differences of neighbouring steps: with less, half an order, nothing can be foretold."""
+"""Of the differences of neighbouring steps: with less, half an order, nothing can be predicted."""
 UNLIKE = 0.3  # part of the differences that may be other than a power of the step (root of the mean square)
 ROUNDING = 1e-12  # what runs of two models that are the same to rounding may differ by, relative or s
 SAMPLES = 2000  # samples at which runs are compared

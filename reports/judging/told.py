@@ -14,6 +14,7 @@ from crossbody.reports.measuring.truth import TRUTH
 WRONG = (Word.CRASHED, Word.OUTSIDE)
 SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$)")
 """What a truth's row says of a horizon shorter than was asked for, or a motion known in part."""
+FINISHED = "finished"  # the row that says whether a run came to its end
 NAMED = 3  # runs that the sentence names
 
 
@@ -37,10 +38,15 @@ class EngineRun:
         return sorted((row for row in self.rows if row["verdict"] in WRONG), key=share, reverse=True)
 
     @property
+    def failed(self) -> Row | None:
+        """The row that says why it ended early, if it did: its other numbers follow from that."""
+        return next((row for row in self.wrong if row["metric"] == FINISHED), None)
+
+    @property
     def judged(self) -> bool:
         """Whether any number of it was held to a limit, beside that it finished."""
         said = (Word.WITHIN, Word.EXPECTED)
-        held = any(row["verdict"] in said and row["metric"] != "finished" for row in self.rows)
+        held = any(row["verdict"] in said and row["metric"] != FINISHED for row in self.rows)
         return held or bool(self.wrong) or self.unbounded is not None
 
     @property
@@ -135,6 +141,8 @@ def _named(texts: Sequence[str]) -> str:
 
 def _off(run: EngineRun, row: Row) -> str:
     """A number of a run that is off, in a few words."""
+    if run.failed:
+        return f"{run.who} on {run.label} (did not finish)"
     times = share(row)
     size = f"{row['value']:.2g}, {times:.2g} times its limit" if math.isfinite(times) else row["verdict"]
     size += f": {row['where']}" if row.get("where") else ""
@@ -142,7 +150,7 @@ def _off(run: EngineRun, row: Row) -> str:
 
 
 def _blamed(run: EngineRun, metric: str) -> str:
-    """The part that is more than half of an error, where its parts are told."""
+    """The part that is more than half of an error, where its parts are known."""
     values = {row["metric"]: abs(row["value"]) for row in run.rows if row["value"] is not None}
     most = [part for part in PARTS if values.get(part_of(metric, part), 0.0) > 0.5 * values.get(metric, math.nan)]
     return f", mostly its {' and '.join(most)}" if most else ""

@@ -125,7 +125,7 @@ def _field(group: pd.DataFrame, scale: bool) -> dict[str, Any]:
 
 
 def _places(cells: pd.DataFrame) -> dict[str, Any]:
-    """Where cells stand, and what is told of them."""
+    """Where cells stand, and what is written on them."""
     return {
         "x": cells["a0"].astype(float), "y": cells["setting"].astype(float), "mode": "markers",
         "hoverinfo": "x+y+text", "text": [_words(row) for row in cells.to_dict(orient="records")],

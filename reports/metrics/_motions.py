@@ -22,7 +22,7 @@ NEEDS: dict[str, str] = {}
 APART = 1e-3  # part of the largest coordinate by which a run has left the truth
 STILL = 1e-6  # a coordinate whose way is below this part of the longest of its like rests
 TURN = 0.5
-"""Angle between samples, rad, beyond which they tell no turn: the rule is off by TURN^2/12 of an
+"""Angle between samples, rad, beyond which they show no turn: the rule is off by TURN^2/12 of an
 axis that goes round, and by whole turns soon."""
 
 
@@ -57,7 +57,7 @@ def rate_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
     Max over coordinates of |sum of (dq - v dt) sign(v)| / sum of |dq|, v dt by the trapezoidal rule between
     samples. Errors of the rule alternate where the motion bends to and fro; a factor on v does not. What
     turns in space moves about its own axes, as its velocity counts; between samples that are too far apart
-    nothing is told of it. None where nothing moves, NaN where a state is no number. It asks nothing of the
+    nothing is said of it. None where nothing moves, NaN where a state is no number. It asks nothing of the
     truth or the law, so that it judges engines that follow another one as well.
     """
     if len(run.t) < 2:

@@ -20,7 +20,7 @@ SMALL, STILL = 1e-6, 1e-9  # a coordinate that moves less than this part of its 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests.
 
-    A quaternion is told by the angle between both, rad, since q and -q are the same rotation.
+    A quaternion is compared by the angle between both, rad, since q and -q are the same rotation.
     """
     off, _ = _errors(truth, run, case)
     return float(np.max(off / scale_of(truth.trajectory, case))) if len(off) else None

@@ -378,8 +378,10 @@ def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
 NOTES = {
     "motion": (
         "Impacts are matched first, and the arcs between them compared; the errors of their times are the "
-        "metric event_times. Differences are cut off at a common floor, the rounding error of the largest "
-        "value of that unit. Across long steps of a solver, a cubic through q and v at both ends is drawn."
+        "metric event_times. An error ends with the last sample that has a counterpart in the truth, early "
+        "if impacts come sooner than the truth's. Differences are cut off at a common floor, the rounding error "
+        "of the largest value of that unit. Across long steps of a solver, a cubic through q and v at both "
+        "ends is drawn."
     ),
     "force": (
         "A small delay of an impact changes lam a lot at one instant, but hardly its impulse: "

@@ -118,9 +118,9 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
     plane = [_line(one, j, forces[j][2], most) for j, one in enumerate(traces)]
     top = max(float(np.nanmax(rows[:, 0], initial=0.0)) for rows, *_ in forces)
     plots = [
-        _plot("cone", i, f"Friction over normal force, {name}", cone,
+        _plot("cone", i, f"Friction over normal force, {name}. Dashed: mu lam, mu = {contact.friction:g}", cone,
               ("lam [N]", "|friction| [N]"), [_edge(contact.friction, top)], name),
-        _plot("plane", i, f"Friction over mu lam in the plane, {name}", plane,
+        _plot("plane", i, f"Friction over mu lam in the plane, {name}. Dashed: the cone's edge", plane,
               ("friction t1 / (mu lam)", "friction t2 / (mu lam)"), [DISC], name),
     ]  # fmt: skip
     if contact.first.type == "plane":
@@ -195,5 +195,4 @@ def _plot(
 
 
 def _edge(mu: float, top: float) -> dict[str, Any]:
-    text = {"text": f"mu lam, mu = {mu:g}", "font": {"size": 11, "color": LEVEL}, "textposition": "start"}
-    return {"type": "line", "x0": 0.0, "y0": 0.0, "x1": top, "y1": mu * top, "line": LINE, "label": text}
+    return {"type": "line", "x0": 0.0, "y0": 0.0, "x1": top, "y1": mu * top, "line": LINE}

@@ -42,7 +42,7 @@ SIGNS = {
     "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·",
     "ledger only": "∑", "skipped": "-", "crashed": "!",
 }  # fmt: skip
-"""A verdict is told by sign and word besides its colour."""
+"""A verdict is shown by sign and word besides its colour."""
 MOST = 2000  # rows of a table that a page shows; the file beside it has all
 THEME = (
     'try { const kept = localStorage.getItem("crossbody-theme"); '
@@ -197,7 +197,7 @@ def render(pages: Sequence[Page], links: Sequence[Link], footer: str, *, single:
 def policy(scripts: Sequence[str], single: bool) -> str:
     """The page's Content-Security-Policy: it runs the scripts that stand here and asks nobody for anything.
 
-    Scripts are told by their hashes; those of the files beside a page run too, unless it is single.
+    Scripts are named by their hashes; those of the files beside a page run too, unless it is single.
     """
     hashes = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts)
     allowed = " ".join([*(f"'sha256-{digest}'" for digest in hashes), *([] if single else ["'self'"])])

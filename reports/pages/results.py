@@ -22,7 +22,7 @@ NUMBER = (int, float, type(None))
 JUDGED = {name: NUMBER if kind is float else (str,) for name, kind in COLUMNS.items()}
 AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
 Times = dict[tuple[str, str], tuple[float, float | None]]
-"""(case:variant, engine:profile) -> run time, and what it took in all where that is told, s."""
+"""(case:variant, engine:profile) -> run time, and what it took in all where that is known, s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

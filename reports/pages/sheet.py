@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats
@@ -19,9 +21,11 @@ from crossbody.reports.runs.thin import AROUND, keep
 FINE = 2e-5  # distance of samples over the horizon below which times are written in double precision
 EVENTS, SHARE = 40, 0.4
 """Events around which all samples stay, the first if very many, and their share of a line."""
-TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 210, 16, 46
+TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 """Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one
 group, between groups (with times), pixels."""
+NAME = 12  # height of the name of a line beside its plot, pixels
+DIGITS = 12  # of the mantissa of a value on a logarithmic axis, bits: four decimal ones
 MODE_COLOURS = {
     Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
     Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
@@ -43,7 +47,7 @@ class Sheet:
 
     def __init__(self, rows: Sequence[str], title: str, points: int, group: int = 1) -> None:
         self.rows, self.title, self.points, self.group = rows, title, points, group
-        self.lines: list[tuple[int, dict[str, Any]]] = []
+        self.lines: list[tuple[int, NDArray[np.float32], dict[str, Any]]] = []
         self.decades: set[int] = set()
         self.ranges: dict[int, tuple[float, float]] = {}
         self.far: dict[str, list[tuple[float, str, str]]] = {}
@@ -75,19 +79,25 @@ class Sheet:
         at = keep(t, y, events, self.points - AROUND * len(events))
         look = style(trace, i)
         line = {
-            "type": "scatter", "x": coded(_times(t[at])), "y": coded(y[at].astype(np.float32)),
+            "type": "scatter", "x": coded(_times(t[at])),
             "name": plain(label(trace)), "meta": label(trace), "mode": "lines",
             "line": {key: look[key] for key in ("color", "dash", "width")} | more,
             "opacity": 0.65 if label(trace) == TRUTH else 1.0,
         }  # fmt: skip
-        self.lines.append((row, line))
+        with np.errstate(over="ignore"):  # what is larger than any plot shows is a gap
+            self.lines.append((row, y[at].astype(np.float32), line))
 
     def done(self) -> dict[str, Any]:
         """The figure."""
-        drawn = sorted({row for row, _ in self.lines})
+        drawn = sorted({row for row, *_ in self.lines})
         axes, height = self._axes(drawn)
         place = {row: number(i + 1) for i, row in enumerate(drawn)}
-        data = [line | {"xaxis": f"x{place[row]}", "yaxis": f"y{place[row]}"} for row, line in self.lines]
+        data = [
+            line
+            | {"y": coded(_short(y) if row in self.decades else y)}
+            | {"xaxis": f"x{place[row]}", "yaxis": f"y{place[row]}"}
+            for row, y, line in self.lines
+        ]
         layout = {"title": {"text": self._caption(drawn)}, "height": height, "showlegend": False} | axes
         limits = [(f"y{place[row]}", value, name) for row, value, name in self.limits if row in place]
         return {"data": data, "layout": layout | {"shapes": [_level(*one) for one in limits]}}
@@ -102,7 +112,8 @@ class Sheet:
         """Axes of the plots that are drawn, and the height of the figure, pixels."""
         last = [i + 1 == len(drawn) or row // self.group != drawn[i + 1] // self.group for i, row in enumerate(drawn)]
         below = [APART if end else CLOSE for end in last[:-1]] + [0]
-        heights = [TALL if row in self.decades else PLOT for row in drawn]
+        names = Counter(row for row, *_ in self.lines)
+        heights = [max(TALL if row in self.decades else PLOT, NAME * names[row]) for row in drawn]
         inside = sum(heights) + sum(below)
         axes: dict[str, Any] = {}
         top = 0
@@ -120,6 +131,13 @@ class Sheet:
         return axes, TOP + inside + BOTTOM
 
 
+def _short(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Round to the digits that a logarithmic axis shows: what is left of the others does not pack."""
+    cut = np.uint32(np.finfo(np.float32).nmant - DIGITS)
+    whole = values.view(np.uint32) + (np.uint32(1) << (cut - np.uint32(1)))
+    return (whole >> cut << cut).view(np.float32)
+
+
 def off_scale(far: Mapping[str, Sequence[tuple[float, str, str]]]) -> str:
     """Say of each engine how far it goes, in which unit and where, at its farthest."""
     told = ((who, *max(places), len(places) - 1) for who, places in far.items())
@@ -130,17 +148,10 @@ def off_scale(far: Mapping[str, Sequence[tuple[float, str, str]]]) -> str:
 
 
 def _level(axis: str, value: float, name: str) -> dict[str, Any]:
-    """A line across a plot, and what it is."""
+    """A line across a plot, and what it is, which the page writes over all lines."""
     ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
-    label = {
-        "text": plain(name),
-        "textposition": "end",
-        "yanchor": "top",
-        "font": {"size": 10, "color": LEVEL},
-        "padding": 1,
-    }
-    line = {"color": LEVEL, "width": 1, "dash": "dash"}
-    return {"type": "line", "layer": "below", "line": line, "label": label} | ends
+    line = {"color": LEVEL, "width": 1.2, "dash": "dash"}
+    return {"type": "line", "layer": "above", "line": line, "name": name} | ends
 
 
 def _lines(name: str) -> str:

@@ -86,7 +86,7 @@ def _rendered(found: Results, single_file: bool) -> Iterator[tuple[str, str]]:
 
 
 def _unreadable(found: Results, error: BaseException) -> str:
-    """Which table has a field that no page can show, as far as can be told."""
+    """Which table has a field that no page can show, as far as that is known."""
     files = ", ".join(name for name in output.tables(found.out))
     what = " ".join(f"{type(error).__name__}: {error}".split())
     return f"{found.out} cannot be shown: a field of {files} or of a motion is not as expected ({what})."

@@ -119,7 +119,7 @@ def _event(t: float, contact: int, before: int, after: int, impulse: float = 0.0
 
 
 def peek(path: Path) -> dict[str, Any]:
-    """What is told about a motion, without the motion: `about`, outcome, steps, run time, events.
+    """What is known about a motion, without the motion: `about`, outcome, steps, run time, events.
 
     Raises:
         OutputError: if it is a link.

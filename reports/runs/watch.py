@@ -1,4 +1,4 @@
-"""A command in a process of its own: Ctrl-C stops it within a second, and what hangs or crashes in there is told.
+"""A command in a process of its own: Ctrl-C stops it within a second, and what hangs or crashes in there is reported.
 
 Compiled code does not come back to the interpreter until it is done, and a kernel may never be:
 no signal handler and no thread of the same process reaches it. The command therefore runs in a

@@ -66,7 +66,7 @@ def shown(name: str, out: Path) -> tuple[Section, ...]:
 
 
 def _written_by(out: Path) -> str:
-    """Version of crossbody in the provenance of a folder; empty where it is not told."""
+    """Version of crossbody in the provenance of a folder; empty where it is not given."""
     try:
         told = json.loads((out / "provenance.json").read_text(encoding="utf-8"))
         return str(told["versions"]["crossbody"])

@@ -29,6 +29,11 @@ MEANS = {
     "end_median": "at the end of a window, median over windows",
     "end_90": "at the end of a window, 90 % quantile over windows",
 }
+OF_FIT = (
+    "These residuals are what the fit leaves in its windows, sample by sample. Metrics of the replay below, such as "
+    "autocorrelation_inside, are of predictions of all windows from their measured starts, whose noise shifts whole "
+    "windows."
+)
 PROFILE = (
     "The profile is the increase of the cost (sum of squares) when one parameter is moved and "
     "all others are fitted again. If it is a symmetric parabola, the intervals from "
@@ -90,4 +95,5 @@ def _told(estimates: pd.DataFrame, held: pd.DataFrame, told: Mapping[str, Any]) 
     if rmse is not None and rmse["held_before"] is not None and rmse["held_after"] is not None:
         text += f" On held-out windows the rmse changed from {rmse['held_before']:.4g} to "
         text += f"{rmse['held_after']:.4g} ({rmse.get('verdict') or 'not judged'})."
-    return f"{text} {' '.join(told['warnings'])} Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."
+    how = f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."
+    return " ".join([text, *told["warnings"], how, OF_FIT])

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
-AGAIN = 1.0  # time after which a run that did not notice is told again, s
+AGAIN = 1.0  # time after which a run that did not notice is signalled again, s
 HARD, HARD_LEAST = 10.0, 60.0
 """A process whose run takes so many times its bound, and at least so many seconds more, is ended."""
 

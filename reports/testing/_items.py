@@ -28,7 +28,7 @@ class Outside(Exception):  # noqa: N818 - a verdict, no error
 
 
 class Judged(pytest.Item):
-    """One test that crossbody makes; what is off is told in its own sentence."""
+    """One test that crossbody makes; what is off is reported in its own sentence."""
 
     where = plugin.MARKER
 
@@ -37,7 +37,7 @@ class Judged(pytest.Item):
         self.add_marker(plugin.MARKER)
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *args: Any, **more: Any) -> Any:
-        """A verdict, or wrong use, is told in its own sentence; anything else with its traceback."""
+        """A verdict, or wrong use, is reported in its own sentence; anything else with its traceback."""
         if isinstance(excinfo.value, Outside):
             return str(excinfo.value)
         if told := installed.sentence(excinfo.value):

@@ -1,4 +1,4 @@
-"""Assertions about motions, told by the first offence: two are the same, one keeps its account."""
+"""Assertions about motions, which report the first offence: two are the same, one keeps its account."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ def test_a_fit_that_is_worse_where_it_was_not_fitted_is_outside(
     out = tmp_path / "out"
     asked = ("identify", two_frictions, *ONE, "-f", "k1", "--out", out)
     assert code(*asked) == 1
-    said = capsys.readouterr().out
+    said = " ".join(capsys.readouterr().out.split())
     assert "worse than the start" in said
     assert re.search(r"outside: reference:compiled held_out_worse is [\d.e+]+ %", said)
     held = json.loads((out / "held_out.json").read_text(encoding="utf-8"))["rows"]

@@ -36,3 +36,28 @@ def test_a_shell_completes_commands_and_names(words: str, wanted: str) -> None:
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stdout.split(), done.stderr) == (0, [wanted], "")
+
+
+@pytest.mark.parametrize(("words", "known"), [
+    ("run bouncing_ball --set ", {"plain,a0=", "plain,a1=", "plain,t_end="}),
+    ("run bouncing_ball --set a0=1e4 --set t_", {"plain,t_end="}),
+    ("run bouncing_ball:linear --set ", {"plain,a0=", "plain,t_end="}),
+    ("analyse soft_contact --set ", {"plain,t_end="}),
+    ("run bouncing_ball --set-engine ", {"plain,reference.rtol=", "plain,mujoco.dt="}),
+    ("run --set-engine refe", {"plain,reference.rtol=", "plain,reference.max_steps="}),
+    ("run bouncing_ball -e mujoco:matched --set-engine mujoco.d", {"plain,mujoco.dt="}),
+])  # fmt: skip
+def test_a_shell_completes_parameters_and_settings(words: str, known: set[str]) -> None:
+    """Those that the command would take; of settings, those of the engines that are asked for."""
+    *before, begun = words.split(" ")
+    asked = {"COMP_WORDS": f"crossbody {words}", "COMP_CWORD": str(len(before) + 1)}
+    done = subprocess.run(
+        [COMMAND], env={**os.environ, **asked, "_CROSSBODY_COMPLETE": "bash_complete"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    offered = done.stdout.split()
+    assert known <= set(offered)
+    assert all(one.startswith(f"plain,{begun}") and one.endswith("=") for one in offered)
+    if " -e " in words:
+        assert all(one.startswith("plain,mujoco.") for one in offered)

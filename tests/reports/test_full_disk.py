@@ -180,11 +180,11 @@ def test_a_part_that_finds_no_room_does_not_count(tmp_path: Path, capsys: pytest
         assert names(tmp_path) == []
     with pytest.raises(OutputError, match="too large"):
         begin(1000)
-    assert "what is complete is kept in" in capsys.readouterr().err
+    assert "what is complete is kept in" in " ".join(capsys.readouterr().err.split())
     (parts,) = (tmp_path / "out").iterdir()
     assert len(names(parts)) == len({ABOUT, "a"})
     begin(10_000)
-    assert "1 parts of an interrupted run" in capsys.readouterr().err
+    assert "1 parts of an interrupted run" in " ".join(capsys.readouterr().err.split())
 
 
 LIMITED = """
@@ -204,12 +204,12 @@ def test_a_run_that_finds_no_room_is_a_sentence_and_goes_on(tmp_path: Path) -> N
     code, said = done(3_000_000)  # room for tables, none for the pages
     assert code == 2
     assert "cannot be written: File too large" in said[-1]
-    assert "what is complete is kept" in said[-2]
+    assert "what is complete is kept" in " ".join(" ".join(said).split())
     (parts,) = (tmp_path / "out").iterdir()
     assert parts.name.startswith(".crossbody-parts.")
     code, said = done(100_000_000)
     assert code == 0
-    assert "1 parts of an interrupted run" in said[0]
+    assert "1 parts of an interrupted run" in " ".join(" ".join(said).split())
     assert (tmp_path / "out" / "index.html").is_file()
 
 

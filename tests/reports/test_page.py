@@ -24,6 +24,7 @@ from unpacked import numbers, value_of, whole
 from crossbody.cases import OutputError, load
 from crossbody.reports.bench.order import observed_order
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
+from crossbody.reports.figures.styles import COLOURS, DASHES, style
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.told import share
 from crossbody.reports.judging.truth import truth_of
@@ -352,6 +353,12 @@ def test_what_is_farthest_out_stands_first(out: Path) -> None:
     order = [far[name] for name in shown if name in far]
     assert len(order) > 10
     assert order == sorted(order, reverse=True)
+
+
+def test_engines_look_different(result: CaseResult) -> None:
+    trace = next(one for one in study.traces(result) if one.truth is not None)
+    each = [replace(trace, about=dict(trace.about) | {"place": i}) for i in range(len(COLOURS) * len(DASHES))]
+    assert len({(style(one, 0)["color"], style(one, 0)["dash"]) for one in each}) == len(each)
 
 
 def test_run_time_is_drawn_against_error(out: Path) -> None:

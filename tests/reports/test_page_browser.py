@@ -220,6 +220,18 @@ def test_a_scene_is_turned_and_looked_at_from_near(solids: Path, browser: chromi
     assert browser.complaints() == []
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_plane_that_a_body_carries_is_where_the_body_is(solids: Path, browser: chromium.Browser, seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    turn, inner = (np.linalg.qr(draw.normal(size=(3, 3)))[0] for _ in range(2))
+    at, own = draw.normal(size=(2, 3))
+    browser.open(solids)
+    given = {"origin": at.tolist(), "axes": turn.T.tolist()}, [*own, *inner[:, 0], *inner[:, 1]]
+    moved = browser.js(f"crossbody.solids.carried({json.dumps(given[0])}, {json.dumps(given[1])})")
+    wanted = [*(at + turn @ own), *(turn @ inner[:, 0]), *(turn @ inner[:, 1])]
+    assert moved == pytest.approx(wanted, abs=1e-12)
+
+
 def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium.Browser) -> None:
     """Nothing but the ground is on the edge of the picture."""
     rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, 0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crossbody.reports import layout, voice
 from crossbody.reports.commands import run_shown
 from crossbody.reports.judging.parts import part_of
 from crossbody.reports.judging.told import runs_of, sentence
@@ -120,3 +121,50 @@ def test_an_engine_that_is_absent_is_one_line(capsys: pytest.CaptureFixture[str]
 def test_a_row_without_a_unit_has_none(capsys: pytest.CaptureFixture[str]) -> None:
     run_shown.show([row("mujoco", "position", 2.0, Word.OUTSIDE, 1.0)], {})
     assert "outside: ball:v mujoco:matched position 2, limit 1. the reason" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "why", ["not_finite: t = 0.00123456789 s, q = [nan]: " + "see the state named. " * 9, "short."]
+)
+def test_a_run_that_failed_is_one_sentence_and_one_entry(why: str, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [
+        row("mujoco", "position", math.nan, Word.OUTSIDE, 1e-6),
+        row("mujoco", "friction_power", math.nan, Word.OUTSIDE),
+        row("mujoco", "finished", 0.0, Word.OUTSIDE, 0.0) | {"why": why},
+        row("reference", "position", 1e-9, Word.WITHIN, 1e-6),
+    ]
+    run_shown.show(rows, {})
+    said = capsys.readouterr().out
+    folded = " ".join(said.split())
+    assert said.count("outside: ") == 1
+    assert f"outside: ball:v mujoco:matched did not finish. {' '.join(why.split())} The report" in folded
+    assert "the 2 numbers that this makes wrong; a shorter --t-end" in folded
+    assert "Off: mujoco:matched on ball:v (did not finish)." in folded
+    assert "nan W" not in said
+    assert "limit nan" not in said
+
+
+def test_a_number_that_is_none_is_not_written_as_one(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [row("mujoco", "friction_power", math.nan, Word.OUTSIDE), row("mujoco", "x", math.nan, Word.OUTSIDE, 1e-6)]
+    run_shown.show(rows, {})
+    said = " ".join(capsys.readouterr().out.split())
+    assert "outside: ball:v mujoco:matched friction_power has no number. the reason" in said
+    assert "outside: ball:v mujoco:matched x has no number, limit 1e-06. the reason" in said
+
+
+@pytest.mark.parametrize("place", range(60))
+def test_a_number_stays_with_its_unit_and_limit(place: int, capsys: pytest.CaptureFixture[str]) -> None:
+    run_shown.show([row("mujoco", "x" * (place + 1), 4.56e-4, Word.OUTSIDE, 1e-5) | {"unit": "kg m^2/s"}], {})
+    said = capsys.readouterr().out
+    assert "0.000456 kg m^2/s" in said
+    assert "limit 1e-05" in said
+    assert layout.NO_BREAK not in said
+
+
+@given(st.lists(st.text("abc:/_-.0123456789", min_size=1, max_size=100), min_size=1, max_size=60))
+def test_sentences_fit_80_columns_and_keep_every_word(words: list[str]) -> None:
+    """Beside what is one word, such as a path."""
+    for lines in (layout.told(" ".join(words)).split("\n"), voice.folded(" ".join(words)).split("\n")):
+        assert all(len(line) <= 80 or len(line.split()) == 1 for line in lines)
+        assert " ".join(lines).split() == words
+        assert all(line.startswith("    ") for line in lines[1:])

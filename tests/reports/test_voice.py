@@ -71,7 +71,8 @@ def test_quiet_says_nothing_where_nothing_is_wrong_and_that_alone_else(capsys: p
     assert call(*RUN, "-q", "--set-engine", "dt=4e-3") == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines
-    assert all(line.startswith("outside: bouncing_ball:linear mujoco:matched ") for line in lines)
+    assert all(line.startswith(("outside: bouncing_ball:linear mujoco:matched ", "    ")) for line in lines)
+    assert max(map(len, lines)) <= 80
 
 
 def test_the_frequency_responses_as_json(capsys: pytest.CaptureFixture[str]) -> None:
@@ -106,7 +107,7 @@ def test_a_faulty_log_tells_the_fault_even_quietly(tmp_path: Path, capsys: pytes
     assert call("log", "info", "log.csv", "--columns", "map.toml", "-q") == 2
     said = capsys.readouterr().out.strip()
     assert said.startswith("fault: time: time, row 70")
-    assert said.count("\n") == 0
+    assert all(line.startswith("    ") for line in said.splitlines()[1:])
 
 
 def test_progress_tells_the_time_left_to_a_terminal_only(

@@ -175,6 +175,9 @@
     const paintSolids = (track, pose, to, ghost) => {
       const frames = Array.from({ length: stage.frames }, (_, body) => crossbody.solids.frame(pose, body));
       const look = { ink: track.color, paper: colours.paper, width: track.truth ? 2 : 1.4, ghost };
+      for (const { plane, body } of ghost ? [] : stage.solids) { // planes that bodies carry
+        if (plane && body >= 0) crossbody.solids.grid(g, crossbody.solids.carried(frames[body], plane), to, middle, 0.5 * Math.hypot(...size), colours.line);
+      }
       crossbody.solids.paint(g, moving, frames, to, look);
       crossbody.solids.bones(g, stage.bones, frames, to);
       if (axes.checked) crossbody.solids.axes(g, frames, to, 0.06 * Math.hypot(...size));
@@ -218,7 +221,7 @@
       g.strokeStyle = g.fillStyle = colours.soft;
       g.lineWidth = 1.2;
       stage.still.forEach((each) => shape(each, (p) => p, to, true));
-      for (const { plane } of stage.solids) if (plane) crossbody.solids.grid(g, plane, to, middle, Math.hypot(...size), colours.line);
+      for (const { plane, body } of stage.solids) if (plane && body < 0) crossbody.solids.grid(g, plane, to, middle, Math.hypot(...size), colours.line);
       crossbody.solids.paint(g, fixed, [], to, { ink: colours.soft, paper: colours.paper, width: 1, ghost: false });
     };
     const bar = (to, x, y, h) => {

@@ -27,7 +27,7 @@
     }
     for (const key of axes(out)) if (key[0] === "y") out[key] = { ...out[key], automargin: true }; // titles beside long ticks
     if (innerWidth < 600) {
-      out.margin = { ...out.margin, l: 58, r: 6 };
+      out.margin = { ...out.margin, l: 58, r: 6, t: out.showlegend === false ? 10 : out.margin.t }; // no buttons there
       out.font = { ...out.font, size: 10 };
       for (const key of axes(out)) {
         if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
@@ -35,6 +35,111 @@
       }
     }
     return out;
+  };
+  // Lines over time are named at their ends, to the right of their plots; on a narrow screen, below the title.
+  const [NARROW, TALL, ROOM] = [560, 12, 12]; // width of such a screen, height of a name, width of what leads to it, pixels
+  const STROKES = { dash: "7 4", dot: "2 3", dashdot: "7 3 2 3" };
+  const SVG = Object.assign(document.createElement("div"), { innerHTML: "<svg></svg>" }).firstChild.namespaceURI;
+  const drawing = (kind, given, ...inside) => {
+    const made = document.createElementNS(SVG, kind);
+    Object.entries(given).forEach(([key, value]) => made.setAttribute(key, value));
+    made.append(...inside);
+    return made;
+  };
+  const own = (line) => line.name && line.line && !line.fill && line.type !== "bar" && line.visible !== false;
+  const last = ({ x, y }, high = Infinity) => {
+    let i = x.length - 1;
+    while (i >= 0 && !(x[i] <= high && Number.isFinite(y[i]))) i -= 1;
+    return i;
+  };
+  const entitle = (lines) => { // one that ends before the others says when
+    const ends = lines.map((line) => line.x[last(line)]);
+    const end = Math.max(...ends.filter(Number.isFinite));
+    lines.forEach((line, i) => {
+      line.title = line.name.replaceAll("&lt;", "<") + (ends[i] < 0.99 * end ? ` until ${Number(ends[i].toPrecision(3))} s` : "");
+    });
+  };
+  const below = (box, lines) => {
+    const key = document.createElement("p");
+    key.className = "curves";
+    key.setAttribute("aria-hidden", "true"); // the buttons on top say the same
+    new Map(lines.map((line) => [line.name, line])).forEach(({ name, meta, line: { color, dash } }) => {
+      const one = document.createElement("span");
+      one.dataset.line = meta;
+      one.hidden = !crossbody.shown(meta);
+      const mark = drawing("path", { d: "M0 3H20", stroke: color, "stroke-dasharray": STROKES[dash] || "none" });
+      one.append(drawing("svg", { width: 20, height: 6 }, mark), name.replaceAll("&lt;", "<"));
+      key.append(one);
+    });
+    box.before(key);
+  };
+  const named = (box, { data, layout }) => {
+    const lines = data.filter(own);
+    if (!box.hasAttribute("data-time") || !lines.length) return null;
+    entitle(lines);
+    const over = drawing("svg", { class: "names", "aria-hidden": "true" });
+    if (box.clientWidth < NARROW) {
+      if (layout.showlegend === false) below(box, lines); // others have a legend
+      return over;
+    }
+    over.dataset.beside = "";
+    const pen = document.createElement("canvas").getContext("2d");
+    pen.font = "11px system-ui, sans-serif";
+    const wide = Math.max(...lines.map((line) => pen.measureText(line.title).width));
+    layout.margin = { ...layout.margin, r: Math.min(Math.ceil(wide) + ROOM + 8, 0.4 * box.clientWidth) };
+    lines.forEach((line) => { line.showlegend = false; });
+    return over;
+  };
+  // Where a line leaves its plot, pixels; nothing where it is not seen.
+  const left = (line, x, y) => {
+    const [low, high] = x.range;
+    const i = last(line, high);
+    if (i < 0) return null;
+    const to = (value) => Math.min(Math.max(y.d2p(value), 0), y._length);
+    const [t, next] = [line.x[i], line.x[i + 1]];
+    if (next > high && Number.isFinite(line.y[i + 1])) {
+      return [x._length, to(line.y[i]) + (high - t) / (next - t) * (to(line.y[i + 1]) - to(line.y[i]))];
+    }
+    return t < low ? null : [x.d2p(t), to(line.y[i])];
+  };
+  // Middles of names, as near to those wanted as they may be without an overlap: the mean of those that meet stays.
+  const spread = (wanted, most) => {
+    const each = Math.min(TALL, most / wanted.length);
+    const top = ([middle, count]) => Math.min(Math.max(middle - count * each / 2, 0), most - count * each);
+    const groups = [];
+    wanted.forEach((height) => {
+      groups.push([height, 1]);
+      while (groups.length > 1 && top(groups.at(-2)) + groups.at(-2)[1] * each > top(groups.at(-1))) {
+        const [[a, m], [b, n]] = groups.splice(-2);
+        groups.push([(m * a + n * b) / (m + n), m + n]);
+      }
+    });
+    return groups.flatMap((group) => Array.from({ length: group[1] }, (_, k) => top(group) + (k + 0.5) * each));
+  };
+  const name = (box) => {
+    const { over } = charts.get(box);
+    const all = box._fullLayout;
+    over.replaceChildren();
+    for (const key of new Set(box.data.map((line) => line.yaxis || "y"))) {
+      const y = all[key.replace("y", "yaxis")];
+      const x = all[y.anchor.replace("x", "xaxis")];
+      const right = x._offset + x._length;
+      const limits = (all.shapes || []).filter(({ yref, name: text }) => text && yref === key).map((shape) => [shape.name, y.d2p(shape.y0)])
+        .filter(([, at]) => at >= 0 && at <= y._length).sort(([, a], [, b]) => a - b);
+      spread(limits.map(([, at]) => at - TALL / 2), y._length).forEach((middle, k) => { // above the line
+        over.append(drawing("text", { class: "limit", x: right - 3, y: y._offset + middle + 3 }, limits[k][0]));
+      });
+      if (!("beside" in over.dataset)) continue;
+      const lines = box.data.filter((line) => own(line) && (line.yaxis || "y") === key);
+      const ends = lines.map((line) => [line, left(line, x, y)]).filter(([, at]) => at).sort(([, a], [, b]) => a[1] - b[1]);
+      spread(ends.map(([, at]) => at[1]), y._length).forEach((middle, k) => {
+        const [{ title, line: { color } }, at] = ends[k];
+        const [there, height] = [right + ROOM, y._offset + middle];
+        const text = drawing("text", { x: there + 3, y: height + 4 }, title);
+        text.style.setProperty("--of", color);
+        over.append(drawing("path", { d: `M${x._offset + at[0]} ${y._offset + at[1]}L${there} ${height}`, stroke: color }), text);
+      });
+    }
   };
   const visible = (data) => data.map((trace) => (trace.meta && !crossbody.shown(trace.meta) ? false : true));
 
@@ -100,14 +205,20 @@
   };
   const make = (box) => {
     const figure = known.get(box);
+    const over = named(box, figure);
     narrow(box, figure);
     const mark = document.createElement("div");
     mark.className = "cursor";
     const shown = visible(figure.data);
     figure.data.forEach((trace, i) => { trace.visible = shown[i]; });
-    charts.set(box, { mark });
+    charts.set(box, { mark, over });
     return Plotly.newPlot(box, figure.data, themed(figure.layout), options).then(() => {
       box.append(mark);
+      if (over) {
+        box.append(over);
+        name(box);
+        box.on("plotly_afterplot", () => name(box));
+      }
       sight.observe(box);
       box.dataset.drawn = "";
       if (figure.layout.xaxis?.range) box.dataset.range = JSON.stringify(figure.layout.xaxis.range);
@@ -147,6 +258,7 @@
   });
   addEventListener("afterprint", () => sized({ width: null, autosize: true }));
   crossbody.on("theme", () => charts.forEach((_, box) => Plotly.relayout(box, scheme(box.layout))));
+  crossbody.on("engines", () => document.querySelectorAll(".curves [data-line]").forEach((each) => { each.hidden = !crossbody.shown(each.dataset.line); }));
   crossbody.on("engines", () => charts.forEach((_, box) => Plotly.restyle(box, { visible: visible(box.data) })));
   let clock = null;
   const marks = () => { if (clock !== null) near.forEach((box) => cursor(box, clock)); };

@@ -22,6 +22,10 @@ crossbody.solids = (() => {
     return { origin: three(0), axes: [x, y, cross(x, y)] };
   };
   const placed = ({ origin, axes }, p) => origin.map((x, i) => x + axes[0][i] * p[0] + axes[1][i] * p[1] + axes[2][i] * p[2]);
+  const carried = (frame, plane) => {
+    const [at, x, y] = [0, 3, 6].map((k) => placed(frame, plane.slice(k, k + 3)));
+    return [...at, ...[x, y].flatMap((end) => end.map((value, i) => value - frame.origin[i]))];
+  };
   const turning = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
   const outline = (points) => {
     const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
@@ -115,5 +119,5 @@ crossbody.solids = (() => {
     const at = placed(frame(pose, body), p);
     return [at.map((x) => x - radius), at.map((x) => x + radius)];
   });
-  return { extent, frame, grid, paint, bones, axes };
+  return { extent, frame, grid, carried, paint, bones, axes };
 })();

@@ -1,0 +1,141 @@
+"""Lines over time are named where they end, apart from each other; on a narrow screen below the title."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import chromium
+import numpy as np
+import pytest
+
+from crossbody.cases import load
+from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.pages import site
+from crossbody.reports.runs import study
+from crossbody.reports.runs.jobs import CaseResult
+from crossbody.reports.runs.output import folder
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(
+        chromium.binary() is None, reason="Chromium is not installed (Debian: apt-get install chromium)."
+    ),
+]
+SHORT = "early:stops"  # a run that ends before the others
+DRAW = """document.querySelectorAll('.plot[data-time]').forEach((box) => box.scrollIntoView()),
+    [...document.querySelectorAll('.plot[data-time]')].every((box) => {
+        if (!('drawn' in box.dataset)) box.scrollIntoView();
+        return 'drawn' in box.dataset; })"""
+NAMES = """[...document.querySelectorAll('.plot[data-time]')]
+    .filter((box) => box.data.some((one) => one.type !== 'bar')).map((box) =>
+    [[...box.querySelectorAll('.names text:not(.limit)')].map((text) => text.textContent),
+                   box.data.filter((one) => one.visible !== false).map((one) => one.name)])"""
+OVERLAPS = """[...document.querySelectorAll('.names')].flatMap((over) => {
+    const boxes = [...over.querySelectorAll('text')].map((text) => [text.textContent, text.getBoundingClientRect()]);
+    const meet = (a, b) => a.left < b.right && b.left < a.right && a.top + 2.5 < b.bottom && b.top + 2.5 < a.bottom;
+    return boxes.flatMap(([one, a], i) => boxes.slice(0, i).filter(([, b]) => meet(a, b)).map(([two]) => [one, two]));
+})"""
+"""Names that meet; the box of a letter is higher than what is drawn of it."""
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight runs that end nearly together, as those of engines that agree do, and one that ends early."""
+    case = load("bouncing_ball", "linear")
+    truth = truth_of(case)
+    exact = truth.trajectory
+    runs = {f"p{k}": replace(exact, q=exact.q * (1.0 + 1e-9 * k)) for k in range(8)}
+    kept = exact.t < 0.4 * exact.t[-1]
+    parts = {name: getattr(exact, name)[kept] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")}
+    entries = [Entry(engine="fake", profile=name, run=run) for name, run in runs.items()]
+    entries.append(Entry(engine="early", profile="stops", run=replace(exact, ledger=None, **parts)))
+    results = [CaseResult(case=case, truth=truth, entries=tuple(entries))]
+    out = tmp_path_factory.mktemp("names") / "out"
+    with folder(out) as made:
+        study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
+        site.write(made)
+    return out / "case-bouncing_ball.linear.html"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
+    opened = chromium.Browser(tmp_path_factory.mktemp("profile"))
+    yield opened
+    opened.close()
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_every_line_over_time_has_its_name_at_its_end(page: Path, browser: chromium.Browser, theme: str) -> None:
+    browser.open(page, theme=theme)
+    browser.wait(DRAW)
+    told = browser.js(NAMES)
+    assert len(told) >= 4
+    for texts, names in told:
+        assert sorted(text.partition(" until")[0] for text in texts) == sorted(names)
+        assert [text for text in texts if text.startswith(SHORT)] == [text for text in texts if "until" in text]
+    assert browser.js(OVERLAPS) == []
+    right = "Math.max(...[...document.querySelectorAll('.names text')].map((one) => one.getBoundingClientRect().right))"
+    assert browser.js(f"{right} <= document.querySelector('.plot[data-time]').getBoundingClientRect().right")
+    assert browser.complaints() == []
+
+
+def test_a_name_stands_at_the_height_of_its_line(page: Path, browser: chromium.Browser) -> None:
+    """The paths that lead there begin at the last sample."""
+    browser.open(page)
+    browser.wait(DRAW)
+    starts, wanted = browser.js(
+        "(() => { const box = document.querySelector('.plot[data-time]'); const all = box._fullLayout;"
+        " const from = (d) => d.match(/M([-\\d.]+) ([-\\d.]+)/).slice(1).map(Number);"
+        " const end = (line) => { const y = all[line.yaxis.replace('y', 'yaxis')]; let i = line.y.length - 1;"
+        " while (!Number.isFinite(line.y[i])) i -= 1;"
+        " return [all.xaxis._offset + all.xaxis.d2p(line.x[i]), y._offset + y.d2p(line.y[i])]; };"
+        " return [[...box.querySelectorAll('.names path')].map((one) => from(one.getAttribute('d'))),"
+        " box.data.map(end)]; })()"
+    )
+    assert len(starts) == len(wanted)
+    assert np.allclose(sorted(starts), sorted(wanted), atol=0.6)
+
+
+def test_names_follow_what_is_shown(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    browser.wait(DRAW)
+    browser.js("document.querySelector('[data-show=\"fake:p3\"]').click()")
+    browser.wait("![...document.querySelectorAll('.names text')].some((text) => text.textContent === 'fake:p3')")
+    browser.js("document.querySelector('[data-show=\"fake:p3\"]').click()")
+    browser.wait("[...document.querySelectorAll('.names text')].some((text) => text.textContent === 'fake:p3')")
+    browser.js(
+        "Plotly.relayout(document.querySelector('.plot[data-time]'), { 'xaxis.range': [2.5, 3.0] }).then(() => 0)"
+    )
+    seen = (
+        "[...document.querySelector('.plot[data-time]').querySelectorAll('.names text')].map((one) => one.textContent)"
+    )
+    browser.wait(f"{seen}.length && !{seen}.some((text) => text.startsWith('{SHORT}'))")
+
+
+def test_limits_are_named_in_full_over_the_lines(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    browser.wait(DRAW)
+    told = browser.js("[...document.querySelectorAll('.names .limit')].map((text) => text.textContent)")
+    drawn = browser.js("[...document.querySelectorAll('.plot[data-time]')].flatMap(({ layout }) =>"
+                       " (layout.shapes || []).map(({ name }) => name))")  # fmt: skip
+    assert drawn
+    assert sorted(told) == sorted(drawn)
+
+
+def test_a_narrow_screen_has_names_below_the_title(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page, width=400)
+    browser.wait(DRAW)
+    assert browser.js("document.querySelectorAll('.names text:not(.limit)').length") == 0
+    keys = browser.js(
+        "[...document.querySelectorAll('.curves')].map((key) => [...key.children].map((one) => one.textContent))"
+    )
+    assert len(keys) >= 4
+    assert all({f"fake:p{k}" for k in range(8)} <= set(key) for key in keys), keys
+    browser.js("document.querySelector('[data-show=\"fake:p3\"]').click()")
+    hidden = "[...document.querySelectorAll('.curves [data-line=\"fake:p3\"]')].map((one) => one.hidden)"
+    assert all(browser.js(hidden))
+    assert browser.js("document.documentElement.scrollWidth <= innerWidth")
+    assert browser.complaints() == []
