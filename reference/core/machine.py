@@ -59,8 +59,8 @@ LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot
 
 @compiled
 def slow(s: Any) -> float:
-    """The rate below which a gap is taken to stand still."""
-    return float(SLOW * s.speed)
+    """The rate below which a gap is taken to stand still; of bodies at rest, beside what drives them."""
+    return float(SLOW * max(s.speed, s.gained_speed))
 
 
 @compiled
