@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from threading import Timer
+from threading import Event, Thread
 
 SLOW_S, EVERY_S = 6.0, 5.0
 """When a compilation is told that was not announced, and how often the count is printed, s."""
@@ -57,9 +57,11 @@ class Count:
         self.told, self._last = True, time.monotonic()
         self.show(len(self.ready & self.needed), len(self.needed))
 
-    def _tell_first(self) -> None:
-        if not self.told:
-            self.tell()
+    def _keep_telling(self, ended: Event) -> None:
+        """Say how far it is where it takes long, and then again: one function alone may take longer than `every`."""
+        while not ended.wait(self.every or EVERY_S if self.told else SLOW_S):
+            if not self.told or (self.every and time.monotonic() - self._last >= self.every):
+                self.tell()
 
     @contextmanager
     def shown(self, show: Callable[[int, int], None], every: float = 0.0) -> Iterator[None]:
@@ -83,13 +85,12 @@ class Count:
             yield
             return
         self._since = time.perf_counter()
-        slow = Timer(SLOW_S, self._tell_first)
-        slow.daemon = True  # a process that ends meanwhile does not wait for it
-        slow.start()
+        ended = Event()
+        Thread(target=self._keep_telling, args=(ended,), daemon=True).start()
         try:
             yield
         finally:
-            slow.cancel()
+            ended.set()
             self._spent, self._since = self.seconds, 0.0
 
 

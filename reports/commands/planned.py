@@ -29,6 +29,14 @@ def checked(
     return picks, asked
 
 
+def check_settings(
+    cases: Sequence[Case], picks: Sequence[choice.Pick], asked: Mapping[str, Value], rtol: float | None
+) -> None:
+    """Check the settings of engines, if any are asked for, as these would be prepared: before the first case is run."""
+    for case in cases if asked else ():
+        _planned(case, picks, asked, rtol)
+
+
 def tell(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], rtol: float | None,
     settings: Sequence[str], out: Path, against: Path | None, others: Sequence[Path], limit: float,

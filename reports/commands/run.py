@@ -44,6 +44,7 @@ def run(
     `budget` is how long the tightest run of a scene may take, s.
     """
     picks, asked = planned.checked(wanted, rtol, settings, out, against, others)
+    planned.check_settings(cases, picks, asked, rtol)
     for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
         click.echo(voice.folded(f"note: {sentence}"), err=True)
     told = provenance(command, rtol=rtol, seed=SEED)

@@ -77,7 +77,8 @@ def _busiest(traces: Sequence[Trace]) -> list[int]:
     bearing = carrying(traces) if traces else []
     for trace in traces:
         lam = np.abs(np.nan_to_num(trace.run.lam)).max(axis=0, initial=0.0)
-        lam = np.where((trace.run.mode == Mode.BILATERAL).all(axis=0), 0.0, lam)
+        still = (np.nan_to_num(trace.run.gap) == 0.0).all(axis=0)  # rows of friction have no depth
+        lam = np.where((trace.run.mode == Mode.BILATERAL).all(axis=0) | still, 0.0, lam)
         if lam.size and lam.max() > 0.0:
             order = np.argsort(-lam, kind="stable")
             return [int(k) for k in order if lam[k] > 0.0 and int(k) in bearing][:MOST_CONTACTS]

@@ -58,6 +58,17 @@ def test_nothing_is_told_before_it_is_asked_for_nor_too_often() -> None:
     assert said == [(1, 4)]
 
 
+def test_a_function_that_takes_long_does_not_silence_the_count() -> None:
+    said = list[tuple[int, int]]()
+    count = Count(every=0.02, show=lambda *told: said.append(told))
+    count.need("ab")
+    count.tell()
+    with count.clocked():
+        time.sleep(0.5)
+    assert len(said) >= 3
+    assert set(said) == {(0, 2)}
+
+
 def test_time_is_counted_once_where_compilations_are_nested_and_while_they_last() -> None:
     count = Count()
     began = time.perf_counter()

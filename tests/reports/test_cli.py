@@ -19,7 +19,7 @@ from crossbody.reports.bench import measure
 from crossbody.reports.bench.ladder import Effort
 from crossbody.reports.cli import main
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.runs import watch
+from crossbody.reports.runs import jobs, watch
 
 
 @dataclass
@@ -275,6 +275,11 @@ def test_a_setting_of_nobody_is_a_sentence(setting: str, words: str, capsys: pyt
     assert call(*LINEAR, "-e", "fake:exact", "--set-engine", setting) == 2
     assert words in capsys.readouterr().err
     assert not Path("out").exists()
+
+
+def test_a_setting_that_an_engine_refuses_is_told_before_any_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jobs, "run_case", lambda *_, **__: pytest.fail("a case was run"))
+    assert call(*LINEAR, "-e", "fake:exact", "--set-engine", "fake.dd=1") == 2
 
 
 def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
