@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.truth import taken
 
 PART = 0.02
 """Part of the largest by which a signal is off: no limit on a motion may be as wide."""
@@ -116,12 +117,6 @@ def _with(run: Trajectory, name: str, at: tuple[int | slice, int | slice], value
     values = np.array(getattr(run, name))
     values[at] = value
     return replace(run, **{name: values})  # type: ignore[arg-type]
-
-
-def taken(run: Trajectory, some: NDArray[np.intp]) -> Trajectory:
-    """Return some samples of a motion, without its account."""
-    names = ("t", "q", "v", "gap", "lam", "energy", "mode")
-    return replace(run, **{name: getattr(run, name)[some] for name in names}, ledger=None)
 
 
 def faults(case: Case, run: Trajectory) -> Iterator[Control]:

@@ -20,7 +20,7 @@ from crossbody.reports.judging.controls import unheard
 from crossbody.reports.judging.reach import followed
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Verdict, Word
-from crossbody.reports.measuring.truth import Truth, shortened
+from crossbody.reports.measuring.truth import Truth, shortened, taken
 
 LABELS = (
     ("bouncing_ball", "elastic"), ("red_body", "resolved"), ("soft_contact", "delta"), ("sliding_block", "flat"),
@@ -97,7 +97,7 @@ def test_what_the_audit_does_not_ask_for_is_told(key: str, monkeypatch: pytest.M
 
 
 def test_a_truth_that_is_not_finite_or_has_few_samples_has_no_controls() -> None:
-    few = replace(TRUTH, trajectory=planted.taken(TRUTH.trajectory, np.arange(5)))
+    few = replace(TRUTH, trajectory=taken(TRUTH.trajectory, np.arange(5)))
     q = np.array(TRUTH.trajectory.q)
     q[3] = math.nan
     for truth in (few, replace(TRUTH, trajectory=replace(TRUTH.trajectory, q=q))):
