@@ -263,7 +263,7 @@ def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
     far.longer = FAR
 
     def outside(name: str, value: float) -> bool:
-        rows = [near.judged(name, value, "", truth, 1.0)]
+        rows = [near.judged(name, off, "", truth, 1.0) for off in (value, -value)]
         if metrics.load(name).UNIT == "1" and near.longer == 1.0:  # other units have caps in their own
             rows.append(far.judged(name, value, "", truth, 1.0))
         if name == "position" and not math.isnan(truth.allowed):  # another source that is off so much is no witness

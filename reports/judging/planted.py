@@ -205,6 +205,10 @@ def gaps(plain: Plain) -> Iterator[Control]:
             fault=f"the gap of row {k} {size:.3g} off for some samples", sees={"gap_residual": roughly(PART)},
             run=plain.off("gap", (slice(i, i + wide), k), size),
         )  # fmt: skip
+    for k in plain.some(rows)[:1]:
+        deep = PART * max(float(np.max(np.abs(run.gap))), RESTS) + float(np.max(-run.gap[:, rows], initial=0.0))
+        below = _with(run, "gap", (plain.samples()[0], k), -deep)
+        yield Control(fault=f"row {k} {deep:.3g} below", run=below, sees={"penetration": exactly(deep)}, wrong=False)
     for k in plain.some(closed):
         i, size = plain.samples()[0], PART + float(np.max(np.abs(run.gap[:, closed])))
         opened = _with(run, "gap", (i, k), size)
