@@ -17,7 +17,6 @@ from crossbody.cases.defaults import TOLERANCE, limits_of
 from crossbody.engines import Run
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.controls import Blind, unheard, unseen
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
 from crossbody.reports.judging.stored import (
     SAME_END,
@@ -50,6 +49,8 @@ from crossbody.reports.measuring.truth import TRUTH, Truth, before, shortened
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from crossbody.reports.judging.controls import Blind
 
 GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
@@ -258,6 +259,8 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
 
 def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
+    from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
+
     near = _Judge(case, JUDGED, truth, command)
     far = _Judge(case, JUDGED, replace(truth, grows=FAR), command)
     far.longer = FAR

@@ -6,7 +6,7 @@ A number that is within says something only if it could have been outside. So ev
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import replace
 from typing import Any
 
@@ -47,22 +47,38 @@ def unseen(case: Case, truth: Truth, outside: Callable[[str, float], bool]) -> I
     if not all(np.isfinite(getattr(run, name)).all() for name in ("t", "q", "v", "gap", "lam", "energy")):
         return
     known, every = replace(truth, at=recorded(run)), metrics.of(case)
-    held = agreement(known, run, case).keys()
+    held = _held(known, run, case)
     plain: dict[tuple[str, int], float | None] = {}
     blind: set[str] = set()
     for control in faults(case, run):
         for name, (least, most) in control.sees.items():
             without = control.plain or run
             if (at := (name, id(without))) not in plain:
-                plain[at] = every[name].measure(known, without, case)
+                plain[at] = _measured(every[name], known, without, case)
             own = abs(plain[at] or 0.0)
             if name in blind or plain[at] is None or not own <= max(OWN * least, most - least):
                 continue
-            value = None if name in HELD - held else every[name].measure(known, control.run, case)
+            value = None if name in HELD - held else _measured(every[name], known, control.run, case)
             found = np.nan if value is None else abs(value)
             if not least - own <= found <= most + own or (control.wrong and not outside(name, found)):
                 blind.add(name)
                 yield name, found, (least, most), control.fault
+
+
+def _held(truth: Truth, run: Trajectory, case: Case) -> Set[str]:
+    """Return by what the sources of a truth are held against each other; all where a metric of these throws."""
+    try:
+        return agreement(truth, run, case).keys()
+    except (Exception, SystemExit):
+        return HELD
+
+
+def _measured(metric: metrics.Metric, truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Return a number; None where its metric throws, which is a row of every run already."""
+    try:
+        return metric.measure(truth, run, case)
+    except (Exception, SystemExit):
+        return None
 
 
 MORE = 1e-6
@@ -75,6 +91,8 @@ def unheard(case: Case) -> Iterator[Blind]:
     """Yield what the parity audit does not see where everything is off by a part in a million, or is not shown."""
     from crossbody import engines
 
+    if "reference" not in engines.names():
+        return
     try:
         theirs = engines.load("reference").prepare(case, "compiled").audit()
     except CaseUnsupported:

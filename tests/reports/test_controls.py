@@ -142,3 +142,15 @@ def test_a_known_deviation_that_passes_in_any_size_is_told(monkeypatch: pytest.M
 def test_sources_that_are_not_held_against_each_other_by_events_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(controls, "agreement", lambda *given: {"position": 0.0})
     assert [row.metric for row in blind(BALL, TRUTH)] == ["event_times"]
+
+
+def test_without_the_reference_its_audit_is_not_asked_and_a_metric_that_throws_says_so_in_its_own_row(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(*given: Any) -> float:
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr(metrics.load("velocity"), "measure", fails)
+    monkeypatch.setattr(engines, "names", lambda: ("mujoco",))
+    assert list(unheard(BALL)) == []
+    assert [row.metric for row in blind(BALL, TRUTH)] == []
