@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import pytest
 from hypothesis import settings
@@ -19,6 +19,23 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # Other work may share the machine: no example fails by how long it takes.
 settings.register_profile("unhurried", settings(), deadline=None)
 settings.load_profile("unhurried")
+
+
+DRAWS = 6  # of a law over seeds, in the gate; make slow looks at the others
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
+    """Leave all but the first seeds of a law over 0, 1, 2, ... to `make slow`; lists of chosen seeds stay whole."""
+    seeds: dict[str, dict[pytest.Item, int]] = {}
+    for item in items:
+        seed = getattr(item, "callspec", None) and item.callspec.params.get("seed")
+        if type(seed) is int:
+            seeds.setdefault(item.nodeid.partition("[")[0], {})[item] = seed
+    for drawn in seeds.values():
+        if set(drawn.values()) == set(range(len(set(drawn.values())))):
+            for item in (item for item, seed in drawn.items() if seed >= DRAWS):
+                item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(autouse=True, scope="session")

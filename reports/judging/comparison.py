@@ -50,6 +50,8 @@ from crossbody.reports.measuring.truth import TRUTH, Truth, before, shortened
 if TYPE_CHECKING:
     import pandas as pd
 
+    from crossbody.reports.judging.controls import Blind
+
 GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
     "slip_times", "stick_times", "friction_impulse", "friction_work",
@@ -111,6 +113,14 @@ class Entry:
     took_s: float = 0.0
 
 
+JUDGED = Entry(engine="reference", profile="compiled")
+"""As whose the numbers of controls are judged: no known property explains its errors."""
+FAR = 1e12
+"""How many times its own horizon, and an error of its start, limits are asked to grow with."""
+UNLIMITED = ("creep_speed", "lam_error", "lam_impulse")
+"""Metrics that controls look at, and that are limited in some cases only."""
+
+
 def compare(
     case: Case, runs: Sequence[Entry | Run], truth: Truth | None = None, command: str = "crossbody run"
 ) -> pd.DataFrame:
@@ -161,7 +171,7 @@ def judged(
     truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
     trusted = shortened(truth)
     rows = [row for entry in entries for row in verdicts(case, entry, trusted, command, begin)]
-    return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command)]
+    return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command), *_blind(case, trusted, command)]
 
 
 PART_ROWS = tuple(part_of(metric, part) for metric in SPLIT for part in PARTS)
@@ -245,6 +255,50 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
                 value=math.nan, expected=claim.expected, unit="", tier=claim.tier.value,
                 verdict=Word.OUTSIDE, command=command, why=f"No run was judged by the claim: {claim.source}.",
             )  # fmt: skip
+
+
+def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
+    """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
+    from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
+
+    near = _Judge(case, JUDGED, truth, command)
+    far = _Judge(case, JUDGED, replace(truth, grows=FAR), command)
+    far.longer = FAR
+
+    def outside(name: str, value: float) -> bool:
+        rows = [near.judged(name, off, "", truth, 1.0) for off in (value, -value)]
+        if metrics.load(name).UNIT == "1" and near.longer == 1.0:  # other units have caps in their own
+            rows.append(far.judged(name, value, "", truth, 1.0))
+        if name == "position" and not math.isnan(truth.allowed):  # another source that is off so much is no witness
+            rows += truth_row(case, replace(truth, agreement={name: value}), command)
+        return all(row.verdict == Word.OUTSIDE for row in rows) or _lets_pass(case, name, value)
+
+    for name, value, (least, most), fault in (*unseen(case, truth, outside), *unheard(case), *_unruled(case)):
+        if least <= value <= most:
+            why = f"A control passes: {fault} is no number outside."
+        else:
+            why = f"A control is not seen as it is: {fault} must come out between {least:.3g} and {most:.3g}."
+        yield Verdict(
+            case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=f"{name} (control)", value=value,
+            unit="", tier=truth.tier.value, verdict=Word.OUTSIDE, command=command, why=why,
+        )  # fmt: skip
+
+
+def _unruled(case: Case) -> Iterator[Blind]:
+    """Yield limits of a case that do not judge engines of which it says nothing else."""
+    own = {limit.metric: limit for limit in case.limits if (limit.engine, limit.profile) == ("*", "*")}
+    for name, limit in own.items():
+        found = limit_for(limits_of(case), name, "", "")
+        value = math.nan if found is None else found.value
+        if value != limit.value:
+            yield name, value, (limit.value, limit.value), "the limit of the case"
+
+
+def _lets_pass(case: Case, name: str, value: float) -> bool:
+    """Whether a case leaves a number unlimited, or one of one's own limits it so widely that faults pass."""
+    of_its_own = math.isnan(compared_until(case)) and not changed(case)
+    own = [limit for limit in case.limits if limit.metric == name and limit.covers(JUDGED.engine, JUDGED.profile)]
+    return name in UNLIMITED or (of_its_own and any(value <= limit.value or limit.known for limit in own))
 
 
 def looser(case: Case, entry: Entry) -> float:
@@ -478,6 +532,25 @@ def _measured(judge_: _Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict
             found = judge_.row(name, math.nan, metric.UNIT, Word.CRASHED, crash(error))
         if found is not None:
             yield found
+            yield from _unbounded(judge_, found)
+
+
+TIMES = 5.0
+"""How many times as large, and as small, a known deviation must not be."""
+
+
+def _unbounded(judge_: _Judge, found: Verdict) -> Iterator[Verdict]:
+    """Say that a known deviation passes in any size, where its size is that of a stored run."""
+    limit, claim, stored = judge_.limit(found.metric), judge_.claims.get(found.metric), judge_.stored.get(found.metric)
+    if found.verdict != Word.EXPECTED or stored is None or limit is None or limit.known_least > 0.0 or judge_.hides():
+        return
+    expected = 0.0 if claim is None else claim.expected
+    for times in (TIMES, 1.0 / TIMES):
+        value = expected + times * deviation(found.value, claim)
+        row = judge_.judged(found.metric, value, found.unit, judge_.truth, found.compared)
+        if row.verdict != Word.OUTSIDE and deviation(value, claim) > limit.value:
+            why = f"A control passes: {times:g} times the known deviation is no number outside."
+            yield replace(row, metric=f"{found.metric} (control)", verdict=Word.OUTSIDE, why=why)
 
 
 def _vanished(judge_: _Judge, shown: Set[str]) -> Iterator[Verdict]:

@@ -84,7 +84,7 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
     second = tight(case)
     told = _held_against(truth, second, case, case.tight)
     # A closed form is not cut short by what is held against it.
-    return replace(told, trusted=math.inf, parted=math.inf, agreement=_agreement(truth, second, case))
+    return replace(told, trusted=math.inf, parted=math.inf, agreement=agreement(truth, second, case))
 
 
 def law_of(case: Case) -> Truth | None:
@@ -279,9 +279,9 @@ def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> 
     agreed = trusted
     if case.chaos is not None:  # what is worse known than the declared time is not compared either
         agreed = min(trusted, case.chaos.until)
-    agreement = _agreement(replace(truth, trusted=agreed), second, case)
+    apart = agreement(replace(truth, trusted=agreed), second, case)
     allowed = PARTED if case.chaos is not None else min(AGREES * rtol, PARTED)
-    return replace(truth, trusted=agreed, parted=trusted, allowed=allowed, growth=growth, agreement=agreement)
+    return replace(truth, trusted=agreed, parted=trusted, allowed=allowed, growth=growth, agreement=apart)
 
 
 def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats]:
@@ -334,7 +334,8 @@ def _booked(run: Ledger, natural: Ledger, at: NDArray[np.intp], after: NDArray[n
     return Ledger(**accounts)
 
 
-def _agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
+def agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
+    """Return by metric how far another motion is from a truth, up to where that is trusted."""
     from crossbody.reports import metrics
 
     truth = shortened(truth)

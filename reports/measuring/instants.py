@@ -10,7 +10,7 @@ from crossbody.cases import Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
 from crossbody.cases.remembered import remembered
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth, taken
 
 SHORT = 1e-6  # s, to which instants of events are judged, as by `crossbody.cases.defaults`
 BEFORE = 0.5 ** np.arange(24.0)
@@ -33,6 +33,12 @@ def off(truth: Truth, expected: float, found: float, guard: Callable[[Trajectory
     late = abs(found - expected)
     if not late > SHORT:
         return late
+    times = truth.trajectory.t
+    first = int(np.searchsorted(times, expected - late))
+    if first < len(times) and times[first] < expected:  # a sample may tell, without the tenth of a second of splines
+        there = guard(taken(truth.trajectory, np.array([first])))
+        if not abs(float(there[0])) <= truth.grows * known:
+            return late
     near = _dense(truth.trajectory)(np.maximum(expected - late * BEFORE, truth.trajectory.t[0]))
     part = float(np.max(np.abs(guard(near)))) / known if known > 0.0 else np.inf
     return SHORT * part if part <= truth.grows else late

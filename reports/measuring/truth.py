@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Chaos, Tier, Trajectory
 from crossbody.cases.arrays import Floats
@@ -107,6 +108,12 @@ def before(run: Trajectory, t: float) -> Trajectory:
         events=tuple(e for e in run.events if not e.t > t),
         switches=tuple(s for s in run.switches if not s.t > t), ledger=booked,
     )  # fmt: skip
+
+
+def taken(run: Trajectory, some: NDArray[np.intp]) -> Trajectory:
+    """Return some samples of a motion, without its account."""
+    names = ("t", "q", "v", "gap", "lam", "energy", "mode")
+    return replace(run, **{name: getattr(run, name)[some] for name in names}, ledger=None)
 
 
 def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:

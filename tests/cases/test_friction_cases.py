@@ -199,7 +199,7 @@ def test_a_bound_that_bears_nothing_beside_a_contact_that_does_pulls_by_rounding
     """A leg falls upright on its foot: the knee stays at its bound, and nothing presses it there."""
     path = tmp_path / "leg.xml"
     path.write_text(LEG)
-    truth = truth_of(cases.from_file(str(path), friction=1, t_end=0.3))
+    truth = truth_of(cases.from_file(str(path), friction=1, t_end=0.14))
     assert truth.trajectory.lam.max() > 100.0
     assert truth.trusted == math.inf, truth.source
 

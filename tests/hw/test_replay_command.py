@@ -175,9 +175,15 @@ def test_a_fit_that_is_worse_where_it_was_not_fitted_is_outside(
     row = sections(out)[0].tables[0].rows[0]
     assert row["half"] == pytest.approx((row["high"] - row["low"]) / 2.0)
     assert f"rmse grew from {held[0]['held_before']:.4g} to {held[0]['held_after']:.4g}:" in said
+
+
+@pytest.mark.slow
+def test_a_fit_that_is_worse_is_within_a_limit_that_allows_it_or_where_nothing_is_held_out(
+    two_frictions: Path, tmp_path: Path
+) -> None:
+    asked = ("identify", two_frictions, *ONE, "-f", "k1", "--out", tmp_path / "out")
     assert code(*asked, "--limit", "held_out_worse=1e9", "--quiet") == 0
     assert code(*asked, "--hold", "0", "--json") == 0
-    capsys.readouterr()
 
 
 @pytest.mark.parametrize(("limits", "expected"), [(["fit=1", "windows_failed=0"], 0), (["fit=1", "rmse=1e-9"], 1)])

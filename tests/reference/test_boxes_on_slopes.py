@@ -42,6 +42,7 @@ def slope(tmp_path_factory: pytest.TempPathFactory) -> cases.Case:
     return cases.from_file(str(path), friction=1)
 
 
+@pytest.mark.slow
 def test_a_box_that_falls_on_its_edge_is_followed_by_both(slope: cases.Case) -> None:
     """Two corners touch while two stick below the surface; where these join again all do, until two have to slide."""
     made = system(slope.scene, slope.law)
@@ -131,7 +132,7 @@ def test_a_box_that_rocks_and_slides_ends_only_where_nothing_goes_on(seed: int) 
     assert found.outcome is Outcome.FINISHED or not goes_on(scene, found)
 
 
-@pytest.mark.parametrize("seed", [0, 4, 10, *(pytest.param(k, marks=pytest.mark.slow) for k in (13, 16, 17, 31))])
+@pytest.mark.parametrize("seed", [0, 10, *(pytest.param(k, marks=pytest.mark.slow) for k in (4, 13, 16, 17, 31))])
 def test_both_machines_drop_a_box_alike_as_far_as_the_law_says(seed: int) -> None:
     scene, q0, _ = dropped(seed)
     until = min(0.4, run(scene, q0, np.zeros(6), 0.4, rtol=1e-9).determined_until)

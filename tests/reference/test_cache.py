@@ -261,7 +261,14 @@ MADE = """
 """
 
 
-@pytest.mark.parametrize("home", ["{}", "{'__name__': 'nowhere'}", "{'__name__': None}", "globals()"])
+@pytest.mark.parametrize(
+    "home",
+    [
+        "{}",
+        *(pytest.param(home, marks=pytest.mark.slow) for home in ("{'__name__': 'nowhere'}", "{'__name__': None}")),
+        "globals()",
+    ],
+)
 def test_kernels_made_of_text_run_again_without_a_word(tmp_path, home):
     code = textwrap.dedent(MADE).replace("HOME", repr(home))
     for _ in range(2):  # from a command and from stdin

@@ -109,6 +109,7 @@ def test_pinocchio_moves_capsules_alike(motion: str) -> None:
     assert apart(case, run(case, rtol=1e-10), theirs) <= 1e-6
 
 
+@pytest.mark.slow
 def test_pinocchio_locates_how_capsules_lie() -> None:
     """They lie along each other for a tenth of a millisecond, which both find by rules of their own."""
     case = rods(**(MOTIONS["turns through along"] | {"t_end": 0.0202}))

@@ -35,7 +35,7 @@ def stops(found: Trajectory) -> set[float]:
     return {event.t for event in found.events if event.after is Mode.STICK and event.t > 0.0}
 
 
-@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+@pytest.mark.parametrize("solver", ["compiled", pytest.param("cvode", marks=pytest.mark.slow)])
 def test_a_wheel_rolls_down_a_slope(solver: str) -> None:
     """On the rims of both caps, whose rows along its axis are one and the same: a = 2/3 g sin."""
     found = run(cylinder(0.6, tilt=0.3), [0, 0, RADIUS, *ACROSS], np.zeros(6), 0.5, solver=solver, rtol=1e-10)

@@ -314,7 +314,7 @@ def test_a_metric_that_never_comes_back_is_a_row_that_crashed(tmp_path: Path) ->
     assert {"position", "velocity"} <= set(rows.loc[rows["variant"] == "two", "metric"])
 
 
-@pytest.mark.parametrize("dry", [(), ("--dry-run",)])
+@pytest.mark.parametrize("dry", [pytest.param((), marks=pytest.mark.slow), ("--dry-run",)])
 def test_a_case_that_is_never_built_is_told_in_a_sentence(dry: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "hangs.py").write_text(f"WHERE = 'build'\n{HANGS}")
     code, said = finished(begun("run", "hangs.py", "-e", "fake:exact", "--time-limit", "1", *dry, cwd=tmp_path))

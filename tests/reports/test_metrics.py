@@ -13,7 +13,7 @@ from crossbody.cases import Case, Event, Ledger, Mode, Tier, Trajectory, load
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
-from crossbody.reports.judging.truth import _agreement, truth_of
+from crossbody.reports.judging.truth import agreement, truth_of
 from crossbody.reports.measuring import scale
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
@@ -86,7 +86,7 @@ def test_clock_puts_every_touch_on_the_truths(truth: Truth) -> None:
 
 def test_sources_of_a_truth_agree_in_their_events_too(truth: Truth, case: Case) -> None:
     """A late impact is laid on the other's before positions are compared."""
-    found = _agreement(truth, shifted(truth.trajectory, 2e-3), case)
+    found = agreement(truth, shifted(truth.trajectory, 2e-3), case)
     assert found["event_times"] == pytest.approx(2e-3, rel=1e-6)
     assert found["position"] < 2e-2
 

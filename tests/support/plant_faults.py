@@ -38,8 +38,9 @@ FAULTS = ROOT / "tests" / "faults.toml"
 FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 RUN_SEES, ALL_SEE = 7 / 8, 39 / 40
 LIMIT_S = 1800.0
-FAILED = 1
-"""Exit code of `crossbody run` and of pytest where something is wrong with what they looked at."""
+FAILED, NO_TEST = 1, 5
+"""Exit codes: of `crossbody run` and of pytest where something is wrong with what they looked at; of pytest where
+its arguments select nothing."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +73,10 @@ class Fault:
 def faults(table: Path = FAULTS) -> tuple[Fault, ...]:
     """Every fault of a table."""
     return tuple(Fault(**fault) for fault in tomllib.loads(table.read_text(encoding="utf-8"))["fault"])
+
+
+class NoTestError(Exception):
+    """A fault names a test that does not exist."""
 
 
 class Tree:
@@ -112,6 +117,7 @@ class Tree:
 
         Raises:
             ValueError: where it ends in another way than by passing or failing.
+            NoTestError: where no test is selected, with whatever fault.
         """
         start = {
             "run": [
@@ -126,6 +132,8 @@ class Tree:
             cwd=self.root, env={**os.environ, "PYTHONPATH": str(self.root), "CROSSBODY_DATA": str(DATA)},
             capture_output=True, text=True, timeout=LIMIT_S, check=False,
         )  # fmt: skip
+        if kind == "test" and ended.returncode == NO_TEST:
+            raise NoTestError(f"pytest {arguments} selects no test.")
         if ended.returncode not in (0, FAILED):
             said = (ended.stdout + ended.stderr)[-2000:]
             raise ValueError(f"{kind} {arguments} ended with exit code {ended.returncode}:\n{said}")
@@ -242,8 +250,11 @@ def main() -> int:
     named = asked.only or [""]
     every = faults(asked.faults)
     wanted = [f for f in every if any(x in f"{f.name} {f.file}" for x in named) and (f.quick or not asked.quick)]
-    kept = Kept(asked.kept)
-    words, enough = summary(look(wanted, kept, asked.jobs))
+    try:
+        words, enough = summary(look(wanted, Kept(asked.kept), asked.jobs))
+    except NoTestError as error:
+        print(error, file=sys.stderr)
+        return 2
     print(words)
     return int(not enough)
 

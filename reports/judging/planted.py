@@ -1,0 +1,464 @@
+"""Faults of known size in the truth's own motion, by which the judge is judged (`crossbody.reports.judging.controls`).
+
+What must come out follows from each fault in closed form: neither a metric nor a limit is asked for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.truth import taken
+
+PART = 0.02
+"""Part of the largest by which a signal is off: no limit on a motion may be as wide."""
+TENTH, MUCH = 0.1, 0.25
+"""Likewise, of velocities and angles, and of multipliers, which robots with servos hold less tightly."""
+SLACK, ROUGH = 1e-3, 3.0
+"""Part, and factor, by which a number may differ from what follows: by rounding, and by where samples stand."""
+QUIET = 1e-5
+"""Part of the horizon within which samples are at an event, and say nothing but of it."""
+SEED, DRAWN = 20261127, 2
+"""Of all draws, and how many coordinates, rows and samples are drawn for one kind of fault."""
+LOOKED, FEW = 400, 40
+"""Samples that identities look at, at most: a fault covers their neighbours; and samples for what takes long."""
+RESTS, TINY = 1e-4, 1e-6
+"""Sizes, SI, and part of an energy, below which a motion is not what its errors are measured by."""
+FAR = 0.01
+"""Part of its largest beyond which what brings an event about is far from zero."""
+HAIR = 1e-7
+"""Gap at a touch, m, that no tolerance leaves, and that is less than what joins two touches."""
+PUSHES = (Mode.CONTACT, Mode.COLLISION, Mode.STICK, Mode.SLIP)
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """A motion with one known fault.
+
+    Attributes:
+        fault: what was done, in words.
+        run: the motion.
+        sees: metric -> least and most of its size, in its unit.
+        plain: the same motion without the fault, where that is not the whole one.
+        wrong: whether what it sees must be outside; else it is no fault, and the number alone must be right.
+    """
+
+    fault: str
+    run: Trajectory
+    sees: Mapping[str, Range]
+    plain: Trajectory | None = None
+    wrong: bool = True
+
+
+def exactly(size: float) -> Range:
+    """Return the range around a size that follows."""
+    return (1.0 - SLACK) * size, (1.0 + SLACK) * size
+
+
+def roughly(size: float) -> Range:
+    """Return the range around a size that samples blur."""
+    return size / ROUGH, size * ROUGH
+
+
+@dataclass
+class Plain:
+    """A motion without a fault, and where faults can be put.
+
+    Attributes:
+        case: what moved.
+        run: the motion.
+        quiet: samples at which nothing happens.
+        normal: rows that open.
+        turning: coordinates that are parts of quaternions.
+    """
+
+    case: Case
+    run: Trajectory
+    quiet: NDArray[np.intp] = field(init=False)
+    normal: NDArray[np.intp] = field(init=False)
+    turning: frozenset[int] = field(init=False)
+    draw: np.random.Generator = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Look where nothing happens."""
+        run = self.run
+        self.draw = np.random.default_rng(SEED)
+        happens = np.sort([*(e.t for e in run.events), *(s.t for s in run.switches), run.t[0], run.t[-1]])
+        behind = np.searchsorted(happens, run.t)
+        around = np.stack([np.maximum(behind - 1, 0), np.minimum(behind, len(happens) - 1)])
+        nearest = np.min(np.abs(run.t - happens[around]), axis=0)
+        self.quiet = np.flatnonzero(nearest > QUIET * self.case.t_end)
+        self.normal = np.flatnonzero(self.case.law.unilateral & run.gap.any(axis=0))
+        self.turning = frozenset(i + k for i in self.case.quaternions for k in range(4))
+
+    def samples(self, among: NDArray[np.bool_] | None = None) -> list[int]:
+        """Draw quiet samples of those that are asked for, in any order."""
+        kept = self.quiet if among is None else self.quiet[among[self.quiet]]
+        return [int(i) for i in self.draw.choice(kept, min(DRAWN, len(kept)), replace=False)]
+
+    def some(self, of: Sequence[int] | NDArray[np.intp]) -> list[int]:
+        """Draw a few of some numbers."""
+        return [int(k) for k in self.draw.permutation(np.array(of, dtype=int))[:DRAWN]]
+
+    def off(self, name: str, at: tuple[int | slice, int], by: float | Floats) -> Trajectory:
+        """Return the motion with one signal off at some places."""
+        return _with(self.run, name, at, getattr(self.run, name)[at] + by)
+
+
+def _with(run: Trajectory, name: str, at: tuple[int | slice, int | slice], value: float | Floats) -> Trajectory:
+    values = np.array(getattr(run, name))
+    values[at] = value
+    return replace(run, **{name: values})  # type: ignore[arg-type]
+
+
+def faults(case: Case, run: Trajectory) -> Iterator[Control]:
+    """Yield every fault that a motion has room for.
+
+    Args:
+        case: what moved.
+        run: the motion of its truth, some hundred samples or more.
+    """
+    plain = Plain(case, run)
+    for kind in KINDS if len(plain.quiet) >= FEW else ():
+        yield from kind(plain)
+
+
+def positions(plain: Plain) -> Iterator[Control]:
+    """Put a coordinate off at one sample, by a part of the largest of its unit; turn a body."""
+    case, run = plain.case, plain.run
+    largest = _of_unit(run.q, case.coordinates, [c.size for c in case.coordinates])
+    for j in plain.some([j for j in range(run.q.shape[1]) if j not in plain.turning]):
+        size, own = PART * float(largest[j]), float(np.max(np.abs(run.q[:, j])))
+        most = max(size / own, size) if own > TENTH * largest[j] else np.inf
+        for i in plain.samples():
+            yield Control(
+                fault=f"{case.coordinates[j].name} off by {size:.3g} {case.coordinates[j].unit} at one sample",
+                run=plain.off("q", (i, j), size), sees={"position": ((1.0 - SLACK) * PART, (1.0 + SLACK) * most)},
+            )  # fmt: skip
+    for j in case.quaternions[:DRAWN]:
+        for i in plain.samples()[:1]:
+            turned = _with(run, "q", (i, slice(j, j + 4)), _turned(run.q[i, j : j + 4], plain.draw.normal(size=3)))
+            yield Control(fault=f"a turn by {PART:g} rad", run=turned, sees={"position": exactly(PART)})
+
+
+def _turned(q: Floats, axis: Floats) -> Floats:
+    """Return the product of a quaternion and that of a turn by PART about an axis."""
+    c, s = np.cos(0.5 * PART), np.sin(0.5 * PART) * axis / np.linalg.norm(axis)
+    return np.array([c * q[0] - q[1:] @ s, *(c * q[1:] + q[0] * s + np.cross(q[1:], s))])
+
+
+def _of_unit(signal: Floats, named: Sequence[Coordinate], least: Sequence[float]) -> Floats:
+    """Return the largest value (n,) of each unit, and at least what a case says that its coordinates are."""
+    groups: dict[str, float] = {}
+    for value, one, size in zip(np.max(np.abs(signal), axis=0).tolist(), named, least, strict=True):
+        groups[one.unit] = max(groups.get(one.unit, RESTS), value, size)
+    return np.array([groups[one.unit] for one in named])
+
+
+def velocities(plain: Plain) -> Iterator[Control]:
+    """Put a velocity off at one sample; record all of them a tenth too large."""
+    case, run = plain.case, plain.run
+    largest = _of_unit(run.v, case.velocities, [c.rate for c in case.velocities])
+    for j in plain.some(range(run.v.shape[1])):
+        for i in plain.samples():
+            yield Control(
+                fault=f"the velocity of {case.velocities[j].name} {PART:g} of the largest off at one sample",
+                run=plain.off("v", (i, j), PART * float(largest[j])), sees={"velocity": exactly(PART)},
+            )  # fmt: skip
+    if np.ptp(run.q, axis=0).max() > RESTS:
+        fast = replace(run, v=(1.0 + TENTH) * run.v)
+        yield Control(fault=f"velocities {TENTH:g} too large", run=fast, sees={"rate_residual": roughly(TENTH)})
+
+
+def starts(plain: Plain) -> Iterator[Control]:
+    """Begin elsewhere."""
+    case, run = plain.case, plain.run
+    largest = _of_unit(run.q, case.coordinates, [c.size for c in case.coordinates])
+    for j in plain.some([j for j in range(run.q.shape[1]) if j not in plain.turning])[: int(run.t[0] == 0.0)]:
+        begun = plain.off("q", (0, j), PART * float(largest[j]))
+        yield Control(
+            fault=f"a start {PART:g} of the largest coordinate off", run=begun, sees={"start_error": exactly(PART)}
+        )
+
+
+def gaps(plain: Plain) -> Iterator[Control]:
+    """Put the gap of a row off at one sample, or at as many as are not looked at; open what is closed."""
+    run, rows = plain.run, plain.normal
+    closed = np.flatnonzero(~plain.case.law.unilateral & (plain.case.law.a0 > 0.0))
+    for k in plain.some(rows):
+        size = PART * max(float(np.max(np.abs(run.gap[:, rows]))), RESTS)
+        i, wide = plain.samples()[0], -(-len(run.t) // LOOKED)
+        said, least = f"the gap of row {k} {size:.3g} off at one sample", (1.0 - SLACK) * PART
+        own = float(np.max(np.abs(run.gap[:, k])))  # its bodies may be farther away than it ever opens
+        most = (1.0 + SLACK) * size / own if own > 0.0 else np.inf
+        yield Control(fault=said, run=plain.off("gap", (i, k), size), sees={"gap_error": (least, most)})
+        size = PART * max(float(np.max(np.abs(run.gap))), RESTS)
+        yield Control(
+            fault=f"the gap of row {k} {size:.3g} off for some samples", sees={"gap_residual": roughly(PART)},
+            run=plain.off("gap", (slice(i, i + wide), k), size),
+        )  # fmt: skip
+    for k in plain.some(rows)[:1]:
+        deep = PART * max(float(np.max(np.abs(run.gap))), RESTS) + float(np.max(-run.gap[:, rows], initial=0.0))
+        below = _with(run, "gap", (plain.samples()[0], k), -deep)
+        yield Control(fault=f"row {k} {deep:.3g} below", run=below, sees={"penetration": exactly(deep)}, wrong=False)
+    for k in plain.some(closed):
+        i, size = plain.samples()[0], PART + float(np.max(np.abs(run.gap[:, closed])))
+        opened = _with(run, "gap", (i, k), size)
+        yield Control(fault=f"row {k} opened by {size:.3g}", run=opened, sees={"constraint_drift": exactly(size)})
+
+
+def energies(plain: Plain) -> Iterator[Control]:
+    """Add to kinetic energies; book work that was not done."""
+    run = plain.run
+    kinetic = float(run.energy[:, 0].max())
+    swing = max(kinetic, float(np.ptp(run.energy[:, 1])))
+    if np.ptp(run.q, axis=0).max() <= RESTS or swing <= TINY * float(np.max(np.abs(run.energy))):
+        return
+    account = {} if run.ledger is None else {"energy_integrator": exactly(PART)}
+    i = plain.samples()[0]
+    yield Control(
+        fault=f"kinetic energy {PART:g} of the largest too large at one sample",
+        run=plain.off("energy", (i, 0), PART * swing), sees={"energy_drift": exactly(PART), **account},
+    )  # fmt: skip
+    if kinetic > 0.0:
+        more = plain.off("energy", (slice(None), 0), PART * run.energy[:, 0])
+        yield Control(fault=f"kinetic energy {PART:g} too large", run=more, sees={"energy_residual": roughly(PART)})
+    if run.ledger is not None and run.gap.shape[1]:
+        work = np.array(run.ledger.contact)
+        work[i, int(plain.draw.integers(work.shape[1]))] += PART * swing
+        yield Control(
+            fault=f"work of a row {PART:g} of the largest energy off at one sample",
+            run=replace(run, ledger=replace(run.ledger, contact=work)), sees={"contact_work": exactly(PART), **account},
+        )  # fmt: skip
+
+
+def forces(plain: Plain) -> Iterator[Control]:
+    """Double all multipliers and impulses; put one off at one sample, to where it pulls, or pushes at nothing."""
+    run, rows = plain.run, plain.normal
+    largest = float(np.max(np.abs(run.lam), initial=0.0))
+    if not largest > RESTS and not any(event.impulse for event in run.events):
+        return
+    events = tuple(replace(event, impulse=2.0 * event.impulse) for event in run.events)
+    yield Control(
+        fault="multipliers and impulses doubled", run=replace(run, lam=2.0 * run.lam, events=events),
+        sees=dict.fromkeys(("lam_impulse_path", "lam_impulse"), roughly(1.0)),
+    )  # fmt: skip
+    if not largest > RESTS:
+        return
+    few = taken(run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
+    twice = replace(few, lam=2.0 * few.lam)
+    yield Control(fault="multipliers doubled", run=twice, sees={"law_residual": roughly(1.0)}, plain=few)
+    at = tuple(np.unravel_index(np.argmax(np.abs(few.lam)), few.lam.shape))
+    one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + MUCH) * few.lam[at])
+    seen = (TENTH * MUCH, ROUGH * MUCH)
+    yield Control(
+        fault="the largest multiplier too large at one sample", run=one, sees={"law_residual": seen}, plain=few
+    )
+    i, k = plain.samples()[0], int(np.argmax(np.max(np.abs(run.lam), axis=0)))
+    one = plain.off("lam", (i, k), MUCH * largest)
+    yield Control(fault="a multiplier off at one sample", run=one, sees={"lam_error": exactly(MUCH)})
+    most = PART * float(np.max(np.abs(run.lam[:, rows]), initial=0.0))
+    wrong = {"pulls": (-most, np.isin(run.mode, PUSHES)), "pushes at nothing": (most, run.mode == Mode.FREE)}
+    for k in plain.some(rows) if most > 0.0 else ():
+        for said, (push, among) in wrong.items():
+            for i in plain.samples(among[:, k])[:1]:
+                sees = {"complementarity": exactly(PART)}
+                yield Control(fault=f"row {k} {said} at one sample", run=_with(run, "lam", (i, k), push), sees=sees)
+
+
+def counts(plain: Plain) -> Iterator[Control]:
+    """Leave out a contact that ended, with its modes and without them."""
+    run = plain.run
+    row, touch, end = _last_contact(plain) or (-1, 0.0, 0.0)
+    if row < 0:
+        return
+    mode = np.array(run.mode)
+    mode[(run.t >= touch) & (run.t <= end), row] = Mode.FREE
+    fewer = tuple(e for e in run.events if not (e.contact == row and touch <= e.t <= end))
+    one = dict.fromkeys(("touch_count", "release_count"), exactly(1.0))
+    yield Control(fault="a contact left out", run=replace(run, mode=mode, events=fewer), sees=one)
+    inside = (run.t > touch) & (run.t < end)
+    known = int(np.sum(inside & ~np.isin(run.t, [e.t for e in run.transitions(row)]) & (run.mode[:, row] != Mode.FREE)))
+    if known:
+        odd = {"mode_residual": (float(known), float(np.sum(mode != run.mode) * mode.shape[1]))}
+        yield Control(fault="a contact without its modes", run=replace(run, mode=mode), sees=odd)
+
+
+def _last_contact(plain: Plain) -> tuple[int, float, float] | None:
+    """Return row, touch and end of a row's last contact, behind which it stays free; of bodies without friction."""
+    for row in plain.some(plain.normal) if not (plain.case.rubs or plain.case.general) else ():
+        events = plain.run.transitions(row)
+        touched = [e.t for e in events if e.before == Mode.FREE and e.after in PUSHES]
+        if touched and events[-1].after == Mode.FREE and touched[-1] < events[-1].t:
+            return row, touched[-1], events[-1].t
+    return None
+
+
+def touches(plain: Plain) -> Iterator[Control]:
+    """Record a touch too early: by a part of the fall onto it, and by a hair."""
+    run = plain.run
+    for event in run.events:
+        if not (event.before == Mode.FREE and event.after in PUSHES) or not event.t > run.t[0]:
+            continue
+        gap = np.abs(run.gap[:, event.contact])
+        off = 0.05 * (event.t - max([e.t for e in run.events if e.t < event.t], default=float(run.t[0])))
+        high = float(np.interp(event.t - off, run.t, gap))
+        if sum(e.t == event.t for e in run.events) > 1 or high < FAR * float(gap.max()):
+            continue
+        hair = HAIR * max(1.0, float(np.max(np.abs(run.q)))) * off / high
+        for early, more in ((off, {"event_times": exactly(off)}), (hair, {})):
+            if early <= off:
+                sees: dict[str, Range] = {"event_gap": _left(run, event, early), **more}
+                yield Control(fault=f"a touch {early:.3g} s early", run=shifted(run, [event], -early), sees=sees)
+        return
+
+
+def _left(run: Trajectory, event: Event, early: float) -> Range:
+    """Return which part of its longest way between samples a row is off its surface before a touch."""
+    gap = run.gap[:, event.contact]
+    return roughly(abs(float(np.interp(event.t - early, run.t, gap))) / float(np.max(np.abs(np.diff(gap)))))
+
+
+def shifted(run: Trajectory, which: Sequence[Event], by: float) -> Trajectory:
+    """Return a motion with the instants of some events off, s."""
+    return replace(run, events=tuple(replace(e, t=e.t + by) if e in which else e for e in run.events))
+
+
+def handed(plain: Plain) -> Iterator[Control]:
+    """Record the end of a collision too early."""
+    run = plain.run
+    ends = [e for e in run.events if (e.before, e.after) == (Mode.COLLISION, Mode.CONTACT)]
+    for event in ends[:1]:
+        off = 0.2 * (event.t - max([e.t for e in run.events if e.t < event.t], default=float(run.t[0])))
+        early = shifted(run, [event], -off)
+        yield Control(fault=f"a hand-over {off:.3g} s early", run=early, sees={"mode_times": exactly(off)})
+
+
+def switched(plain: Plain) -> Iterator[Control]:
+    """Record too early that what slides holds, or the other way about."""
+    run = plain.run
+    between = {Mode.STICK, Mode.SLIP}
+    turns = [e for e in run.events if {e.before, e.after} == between]
+    for slides, metric in ((False, "stick_times"), (True, "slip_times")):
+        for event in [e for e in turns if (e.after == Mode.SLIP) == slides][-1:]:
+            off = 0.05 * (event.t - max([e.t for e in run.events if e.t < event.t], default=float(run.t[0])))
+            same = [e for e in run.events if e.t == event.t]
+            if not _shows(plain, event, event.t - off):
+                continue
+            yield Control(
+                fault=f"a change between slip and stick {off:.3g} s early", run=shifted(run, same, -off),
+                sees={metric: exactly(off)},
+            )  # fmt: skip
+
+
+def _shows(plain: Plain, event: Event, t: float) -> bool:
+    """Whether at an instant before a change slip, or what friction is below its bound, is far from none."""
+    run, (rows, ways, bound) = plain.run, _bounds(plain.case, plain.run)
+    if (system := equations(plain.case)) is None or event.contact not in rows:
+        return False
+    k, i = int(np.searchsorted(rows, event.contact)), int(np.searchsorted(run.t, t))
+    if event.after == Mode.SLIP:
+        below = np.abs(bound[:, k] - np.linalg.norm(run.lam[:, ways[k]], axis=1))
+        return bool(below[i] > FAR * float(bound[:, k].max()))
+    some = [i, *range(0, len(run.t), -(-len(run.t) // FEW))]
+    drift = np.asarray(system.drift, dtype=np.float64)
+    slips = [float(np.linalg.norm((system.gap(run.q[j], run.v[j])[1] - drift)[ways[k]])) for j in some]
+    return slips[0] > FAR * max(slips)
+
+
+def clocks(plain: Plain) -> Iterator[Control]:
+    """Stretch time between touches, or between slips and sticks: laid beside the truth, the motion is the same."""
+    run = plain.run
+    touched = {e.t for e in run.events if e.before == Mode.FREE and e.after in PUSHES and e.t > run.t[0]}
+    turned = {e.t for e in run.events if {e.before, e.after} == {Mode.STICK, Mode.SLIP}}
+    rubs = plain.case.rubs or plain.case.general
+    if rubs == bool(touched) or not touched | turned:
+        return
+    knots = sorted(touched | turned)
+    late = PART * float(np.min(np.diff([run.t[0], *knots]))) * np.resize([1.0, -1.0], len(knots))
+
+    def stretched(t: Floats) -> Floats:
+        moved: Floats = t + np.interp(t, [run.t[0], *knots], [0.0, *late])
+        return moved
+
+    other = replace(
+        run, t=stretched(run.t), events=tuple(replace(e, t=float(stretched(np.array(e.t)))) for e in run.events)
+    )
+    sees = dict.fromkeys(("position", "velocity", "gap_error"), (0.0, TINY))
+    if rubs:
+        sees = {"lam_impulse_path": exactly(_apart(run, other))}
+    yield Control(fault="another clock between events", run=other, sees=sees, wrong=False)
+
+
+def _apart(run: Trajectory, other: Trajectory) -> float:
+    """Return how far impulses are apart in two clocks, over the largest."""
+    total = [np.cumsum(0.5 * np.diff(one.t)[:, None] * (one.lam[1:] + one.lam[:-1]), axis=0) for one in (run, other)]
+    return float(np.max(np.abs(total[1] - total[0])) / np.max(np.abs(total[0]), initial=1e-300))
+
+
+def friction(plain: Plain) -> Iterator[Control]:
+    """Let what slides exceed its bound at one sample, and turn it."""
+    rows, ways, bound = _bounds(plain.case, plain.run)
+    most = float(np.max(bound, initial=0.0))
+    yield from _creeping(
+        plain, [way for row, way in zip(rows, ways, strict=True) if plain.run.mode[-1, row] == Mode.STICK]
+    )
+    for k in plain.draw.permutation(len(rows)).tolist() if most > 0.0 else ():
+        slides = plain.run.mode[:, rows[k]] == Mode.SLIP
+        lower = bound[:, k] < (1.0 - TENTH) * most  # than the hardest: it tells the bound of each from that of all
+        among = slides & (bound[:, k] > TENTH * most)
+        for i in plain.samples(among & lower if (among & lower)[plain.quiet].any() else among)[:1]:
+            yield from _rubbed(plain, i, k)
+            return
+
+
+def _creeping(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
+    """Let everything move at the end, where contacts hold."""
+    system, run = equations(plain.case), taken(plain.run, np.arange(len(plain.run.t))[-FEW:])
+    if system is None or not ways:
+        return
+    v = run.v[-1] + PART * plain.draw.normal(size=run.v.shape[1])
+    rates = system.gap(run.q[-1], v)[1] - np.asarray(system.drift, dtype=np.float64)
+    fastest = max(float(np.linalg.norm(rates[way])) for way in ways)
+    moving = replace(run, v=np.concatenate([run.v[:-1], [v]]))
+    yield Control(fault="what holds moves", run=moving, plain=run, sees={"creep_speed": exactly(fastest)})
+
+
+def _bounds(case: Case, run: Trajectory) -> tuple[NDArray[np.intp], list[slice], Floats]:
+    """Return the rows with friction, the rows along which it acts, and its bounds (n, k), N."""
+    system = equations(case)
+    if system is None or not system.frictional:
+        return np.zeros(0, dtype=np.intp), [], np.zeros((len(run.t), 0))
+    rows = np.flatnonzero(system.tangents)
+    ways = [slice(int(system.tangent[k]), int(system.tangent[k] + system.tangents[k])) for k in rows]
+    return rows, ways, system.friction[rows] * np.where(system.dry[rows], 1.0, run.lam[:, rows])
+
+
+def _rubbed(plain: Plain, i: int, k: int) -> Iterator[Control]:
+    """Change friction of one place at one sample, among its neighbours."""
+    hardest = int(np.argmax(_bounds(plain.case, plain.run)[2].max(axis=1)))
+    some = np.union1d(np.arange(max(i - FEW // 2, 0), min(i + FEW // 2, len(plain.run.t))), hardest)
+    few, i = taken(plain.run, some), int(np.searchsorted(some, i))
+    rows, ways, bound = _bounds(plain.case, few)
+    own, said = np.array(few.lam[i, ways[k]]), f"friction of row {rows[k]}"
+    size = PART * float(np.linalg.norm(own)) / float(bound.max())
+    more = _with(few, "lam", (i, ways[k]), (1.0 + PART) * own)
+    yield Control(fault=f"{said} {PART:g} too large", run=more, plain=few, sees={"cone_violation": exactly(size)})
+    if len(own) == 2:
+        c, s = np.cos(TENTH), np.sin(TENTH)
+        turned = _with(few, "lam", (i, ways[k]), np.array([[c, -s], [s, c]]) @ own)
+        sees = {"friction_angle": roughly(TENTH)}
+        yield Control(fault=f"{said} turned by {TENTH:g} rad", run=turned, plain=few, sees=sees)
+
+
+KINDS: tuple[Callable[[Plain], Iterator[Control]], ...] = (
+    positions, velocities, starts, gaps, energies, forces, counts, touches, handed, switched, clocks, friction,
+)  # fmt: skip

@@ -1,0 +1,156 @@
+"""Known faults in the truth's own motion come out as large as they are, and outside; a metric that is blind is told."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from random_scenes import random_scene, random_state, with_own_laws
+
+from crossbody import cases, engines
+from crossbody.cases import Case, Limit
+from crossbody.reports import metrics
+from crossbody.reports.judging import audit, comparison, controls, planted, verdict
+from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.controls import unheard
+from crossbody.reports.judging.reach import followed
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Verdict, Word
+from crossbody.reports.measuring.truth import Truth, shortened, taken
+
+LABELS = (
+    ("bouncing_ball", "elastic"), ("red_body", "resolved"), ("soft_contact", "delta"), ("sliding_block", "flat"),
+    ("rolling_sphere", "side_spin"), ("held_weight", "sprung"), ("newtons_cradle", "unequal"),
+)  # fmt: skip
+BALL = cases.load("bouncing_ball", "elastic")
+TRUTH = truth_of(BALL)
+
+
+def blind(case: Case, truth: Truth) -> list[Verdict]:
+    """The rows of controls, under the names of their metrics."""
+    rows = comparison._blind(case, shortened(truth), "")
+    return [replace(row, metric=row.metric.removesuffix(" (control)")) for row in rows]
+
+
+@pytest.mark.parametrize(("name", "variant"), LABELS)
+def test_every_fault_of_a_shipped_case_is_seen(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    assert blind(case, truth_of(case)) == []
+
+
+def test_all_metrics_that_every_case_limits_have_a_control() -> None:
+    made = [cases.load(name, variant) for name, variant in LABELS]
+    seen = {name for case in made for fault in planted.faults(case, truth_of(case).trajectory) for name in fault.sees}
+    limited = {limit.metric for case in made for limit in cases.defaults.default_limits(case)}
+    assert limited - seen <= {"*", "slip_times"}  # of these none turns from stick to slip
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.1, 10.0])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "position", "velocity", "gap_error", "energy_drift", "energy_integrator", "energy_residual", "contact_work",
+        "lam_impulse_path", "law_residual", "complementarity", "rate_residual", "start_error", "touch_count",
+        "release_count", "mode_residual", "event_times", "event_gap", "gap_residual",
+    ],
+)  # fmt: skip
+def test_a_metric_that_is_wrong_by_a_factor_is_told(name: str, factor: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = metrics.load(name)
+
+    def measure(*given: Any) -> float | None:
+        value = own.measure(*given)
+        return None if value is None else factor * value
+
+    wrong = SimpleNamespace(UNIT=own.UNIT, CLAIMED=own.CLAIMED, measure=measure)
+    every = metrics.of
+    monkeypatch.setattr(metrics, "of", lambda case: {**every(case), name: wrong})
+    rows = blind(BALL, TRUTH)
+    assert [(row.metric, row.verdict) for row in rows] == [(name, Word.OUTSIDE)]
+
+
+def test_a_verdict_or_a_cap_that_lets_faults_pass_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = comparison.judge
+    monkeypatch.setattr(comparison, "WIDEST", 1.0)
+    capped = {row.metric for row in blind(BALL, TRUTH)}
+    monkeypatch.undo()
+    monkeypatch.setattr(comparison, "judge", lambda value, *more: own(0.0 * value, *more))
+    assert {row.metric for row in blind(BALL, TRUTH)} >= {"position", "velocity", "touch_count"}
+    assert capped >= {"position", "velocity"}
+
+
+def test_a_limit_too_wide_is_told_in_a_case_of_the_library_and_belongs_to_one_s_own() -> None:
+    wide = replace(BALL, limits=(*BALL.limits, Limit(metric="velocity", value=0.5, why="wide")))
+    assert [row.metric for row in blind(wide, TRUTH)] == ["velocity"]
+    assert blind(replace(wide, name="my_ball"), TRUTH) == []
+
+
+@pytest.mark.parametrize("key", ["constants", "q0", "M", "bias", "H", "lam"])
+def test_what_the_audit_does_not_ask_for_is_told(key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert list(unheard(BALL)) == []
+    for name in ("NUMBERS", "FUNCTIONS"):
+        monkeypatch.setattr(audit, name, tuple(one for one in getattr(audit, name) if one != key))
+    assert {fault.partition(" ")[0] for _, _, _, fault in unheard(BALL)} == {key}
+
+
+def test_a_truth_that_is_not_finite_or_has_few_samples_has_no_controls() -> None:
+    few = replace(TRUTH, trajectory=taken(TRUTH.trajectory, np.arange(5)))
+    q = np.array(TRUTH.trajectory.q)
+    q[3] = math.nan
+    for truth in (few, replace(TRUTH, trajectory=replace(TRUTH.trajectory, q=q))):
+        assert blind(BALL, truth) == []
+
+
+def test_a_blind_metric_makes_the_table_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = comparison._entry(engines.load("reference").prepare(BALL, "compiled"))
+    assert verdict.exit_code(row.verdict for row in judged(BALL, [entry], TRUTH, "")) == 0
+    monkeypatch.setattr(metrics.load("velocity"), "measure", lambda *given: 0.0)
+    assert verdict.exit_code(row.verdict for row in judged(BALL, [entry], TRUTH, "")) == 1
+
+
+@pytest.mark.parametrize("seed", [0, 2, 6, 14, 17, 25])
+def test_no_control_fails_on_random_scenes(seed: int) -> None:
+    scene = with_own_laws(random_scene(seed, bodies=1 + seed % 4), seed)
+    q, v, _ = random_state(scene, np.random.default_rng(seed))
+    known = followed(cases.from_scene(scene, q0=q, v0=0.3 * v, t_end=0.3), 1.0)
+    truth = truth_of(known.case, known, 0.5)
+    assert len(list(planted.faults(known.case, shortened(truth).trajectory))) > 8
+    assert blind(known.case, truth) == []
+
+
+def test_a_limit_of_a_case_that_does_not_judge_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    tracks = cases.load("delta_tracking", "circle")
+    assert list(comparison._unruled(tracks)) == []
+    monkeypatch.setattr(comparison, "limits_of", lambda case: (*case.limits, *cases.defaults.default_limits(case)))
+    assert [name for name, _, _, _ in comparison._unruled(tracks)]
+
+
+def test_a_known_deviation_that_passes_in_any_size_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    entry = comparison._entry(engines.load("mujoco").prepare(cases.load("sliding_block", "stops"), "default"))
+    case = cases.load("sliding_block", "stops")
+    truth = truth_of(case)
+    rows = judged(case, [entry], truth, "")
+    assert any(row.verdict == Word.EXPECTED for row in rows)
+    assert not any("(control)" in row.metric for row in rows)
+    monkeypatch.setattr(verdict, "FACTOR", 100.0)
+    assert any("(control)" in row.metric for row in judged(case, [entry], truth, ""))
+
+
+def test_sources_that_are_not_held_against_each_other_by_events_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(controls, "agreement", lambda *given: {"position": 0.0})
+    assert [row.metric for row in blind(BALL, TRUTH)] == ["event_times"]
+
+
+def test_without_the_reference_its_audit_is_not_asked_and_a_metric_that_throws_says_so_in_its_own_row(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(*given: Any) -> float:
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.setattr(metrics.load("velocity"), "measure", fails)
+    monkeypatch.setattr(engines, "names", lambda: ("mujoco",))
+    assert list(unheard(BALL)) == []
+    assert [row.metric for row in blind(BALL, TRUTH)] == []
