@@ -49,7 +49,8 @@ class Count:
         if name in self.ready:
             return
         self.ready.add(name)
-        if name in self.needed and self.told and time.monotonic() - self._last >= self.every:
+        due = time.monotonic() - self._last >= self.every or not self.needed - self.ready
+        if name in self.needed and self.told and due:
             self.tell()
 
     def tell(self) -> None:
@@ -60,7 +61,8 @@ class Count:
     def _keep_telling(self, ended: Event) -> None:
         """Say how far it is where it takes long, and then again: one function alone may take longer than `every`."""
         while not ended.wait(self.every or EVERY_S if self.told else SLOW_S):
-            if not self.told or (self.every and time.monotonic() - self._last >= self.every):
+            again = self.every and time.monotonic() - self._last >= self.every
+            if self.needed - self.ready and (again or not self.told):
                 self.tell()
 
     @contextmanager
