@@ -61,8 +61,8 @@ class Count:
     def _keep_telling(self, ended: Event) -> None:
         """Say how far it is where it takes long, and then again: one function alone may take longer than `every`."""
         while not ended.wait(self.every or EVERY_S if self.told else SLOW_S):
-            again = self.every and time.monotonic() - self._last >= self.every
-            if self.needed - self.ready and (again or not self.told):
+            due = self.every and time.monotonic() - self._last >= self.every
+            if not self.told or (due and self.needed - self.ready):
                 self.tell()
 
     @contextmanager
