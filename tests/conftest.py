@@ -30,7 +30,7 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
     seeds: dict[str, dict[pytest.Item, int]] = {}
     for item in items:
         seed = getattr(item, "callspec", None) and item.callspec.params.get("seed")
-        if type(seed) is int:
+        if type(seed) is int and not item.get_closest_marker("slow"):
             seeds.setdefault(item.nodeid.partition("[")[0], {})[item] = seed
     for drawn in seeds.values():
         if set(drawn.values()) == set(range(len(set(drawn.values())))):
