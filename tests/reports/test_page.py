@@ -344,6 +344,25 @@ def test_a_cell_is_the_warmer_the_farther_out(word: Word) -> None:
     assert heat(np.nan) == 6
 
 
+@pytest.mark.parametrize("seed", range(50))
+def test_what_is_beyond_a_limit_for_a_known_cause_is_as_warm_and_as_high_as_what_is_outside(seed: int) -> None:
+    """The word of a number says who is to blame; its colour and its place say how far out it is."""
+    rng = np.random.default_rng(seed)
+    times = 10.0 ** rng.uniform(-3.0, 5.0, 8)
+    words = [(Word.INFO, Word.OUTSIDE)[rng.integers(2)] if size > 1.0 else Word.WITHIN for size in times]
+    rows = [
+        Verdict(case="c", variant="v", engine="e", profile="p", metric=f"m{i}", value=size, unit="1", limit=1.0,
+                tier="A", verdict=word).row() | {"who": "e:p"}
+        for i, (size, word) in enumerate(zip(times, words, strict=True))
+    ]  # fmt: skip
+    lines = grid.of_case(rows, "page", "c:v", {})[2:]
+    assert [line.text for line in lines] == [f"m{i}" for i in np.argsort(-times)]
+    for line in lines:
+        size = times[int(line.text[1:])]
+        assert size < 1.0 or line.cells[0].heat == min(int(np.log10(size)), 6)
+        assert line.cells[0].heat >= 0
+
+
 def test_what_is_farthest_out_stands_first(out: Path) -> None:
     text = (out / CASE).read_text().replace("<wbr>", "")
     body = text[text.index('--glance">') :]
