@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ import click
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Value
-from crossbody.reports import layout
+from crossbody.reports import layout, voice
 from crossbody.reports.judging.stored import words
+from crossbody.reports.layout import several
 from crossbody.reports.pages import results
 from crossbody.reports.runs import choice, output
 
@@ -45,14 +47,35 @@ def tell(
     cases = choice.load_cases(names, variant, choice.parse_settings(pairs), limit)
     picks, asked = checked(wanted, rtol, settings, out, against, others)
     found = [(case, _planned(case, picks, asked, rtol)) for case in cases]
+    if voice.as_json():
+        voice.result(json.dumps([_plain_plan(case, known) for case, known in found], default=str))
+        return 0
     for case, known in found:
         parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
-        click.echo(f"{case.label}: {len(case.v0)} velocities, {len(case.contacts)} rows, {case.t_end:g} s")
+        counts = f"{several(len(case.v0), 'velocity', 'velocities')}, {several(len(case.contacts), 'row')}"
+        click.echo(f"{case.label}: {counts}, {case.t_end:g} s")
         click.echo(layout.told(f"  parameters: {parameters}") if parameters else "  no parameters")
         for engine, profile, told in known:
             line = f"  {engine}:{profile}  {told if isinstance(told, str) else words(told)}"
             click.echo(layout.told(line.rstrip()))
     return 0
+
+
+def _plain_plan(case: Case, known: Sequence[tuple[str, str, Mapping[str, Any] | str]]) -> dict[str, Any]:
+    """Return what would be run of one case, as plain values; an engine that would not run has a reason instead."""
+    own = [("skipped", told) if isinstance(told, str) else ("settings", _finite(told)) for _, _, told in known]
+    engine_rows = [
+        {"engine": engine, "profile": profile, key: value}
+        for (engine, profile, _), (key, value) in zip(known, own, strict=True)
+    ]
+    return {
+        "case": case.name, "variant": case.variant, "velocities": len(case.v0), "rows": len(case.contacts),
+        "t_end": case.t_end, "parameters": _finite(case.parameters), "engines": engine_rows,
+    }  # fmt: skip
+
+
+def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: voice.finite(value) for name, value in values.items()}
 
 
 def _planned(
