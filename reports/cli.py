@@ -58,10 +58,12 @@ def cli() -> None:
 
 
 @cli.command("list")
-@click.argument("name", metavar="[CASE or ENGINE]", required=False, shell_complete=options.names_of("cases", "engines"))
+@click.argument(
+    "name", metavar="[NAME]", required=False, shell_complete=options.names_of("cases", "engines", "hw.models")
+)  # fmt: skip
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
 def list_(name: str | None, plain: bool) -> None:
-    """List all names, or the details of CASE or ENGINE.
+    """List all names, or the details of a case, robot file, engine or model of logs.
 
     Names are those of cases, engines, metrics, stress suites and models of logs.
     """

@@ -44,11 +44,6 @@ def unit_text(unit: str, form: str = " {}") -> str:
     return "" if unit in ("", "1") else form.format(unit)
 
 
-def several(count: int, one: str, many: str = "") -> str:
-    """Return how many there are of what is called `one`, and otherwise `many`, else with an s."""
-    return f"{count} {one if count == 1 else many or f'{one}s'}"
-
-
 def laid_out(
     names: Sequence[str], cells: Mapping[str, Sequence[str]], width: int, *, head: str = "",
     above: Sequence[str] = (), left_out: Sequence[str] = (), colours: Mapping[str, str] | None = None,

@@ -11,9 +11,9 @@ import click
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Value
+from crossbody.cases.errors import several
 from crossbody.reports import layout, voice
 from crossbody.reports.judging.stored import words
-from crossbody.reports.layout import several
 from crossbody.reports.pages import results
 from crossbody.reports.runs import choice, output
 
