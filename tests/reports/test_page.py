@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from html import unescape
+from html import escape, unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -372,6 +372,15 @@ def test_what_is_farthest_out_stands_first(out: Path) -> None:
     order = [far[name] for name in shown if name in far]
     assert len(order) > 10
     assert order == sorted(order, reverse=True)
+
+
+def test_the_index_names_the_number_of_a_case_that_is_farthest_out_of_those_of_the_worst_word(out: Path) -> None:
+    text = (out / "index.html").read_text().replace("<wbr>", "")
+    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if grid.held(row)]
+    worst = min(grid.RANKED.index(row["verdict"]) for row in rows)
+    far = max((row for row in rows if grid.RANKED.index(row["verdict"]) == worst), key=share)
+    named = escape(f"{far['engine']}:{far['profile']}: {far['metric']} {grid.short(far['value'])}")
+    assert f"<small>{named}</small>" in text
 
 
 def test_engines_look_different(result: CaseResult) -> None:
