@@ -17,6 +17,9 @@ from crossbody.reports.judging.stored import words
 from crossbody.reports.pages import results
 from crossbody.reports.runs import choice, output
 
+RUBS = "if its motion comes to a contact with friction"
+"""When the rows of a file's contacts are run: the motion tells, which a plan does not follow."""
+
 
 def checked(
     wanted: Sequence[str], rtol: float | None, settings: Sequence[str],
@@ -46,14 +49,15 @@ def tell(
     """Print what `run` would do with the same words; the exit code."""
     cases = choice.load_cases(names, variant, choice.parse_settings(pairs), limit)
     picks, asked = checked(wanted, rtol, settings, out, against, others)
-    found = [(case, _planned(case, picks, asked, rtol)) for case in cases]
+    each = [(case, condition) for one in cases for case, condition in _conditions(one)]
+    found = [(case, condition, _planned(case, picks, asked, rtol)) for case, condition in each]
     if voice.as_json():
-        voice.result(json.dumps([_plain_plan(case, known) for case, known in found], default=str))
+        voice.result(json.dumps([_plain_plan(*one) for one in found], default=str))
         return 0
-    for case, known in found:
+    for case, condition, known in found:
         parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
         counts = f"{several(len(case.v0), 'velocity', 'velocities')}, {several(len(case.contacts), 'row')}"
-        click.echo(f"{case.label}: {counts}, {case.t_end:g} s")
+        click.echo(layout.told(f"{case.label}{condition and f', {condition}'}: {counts}, {case.t_end:g} s"))
         click.echo(layout.told(f"  parameters: {parameters}") if parameters else "  no parameters")
         for engine, profile, told in known:
             line = f"  {engine}:{profile}  {told if isinstance(told, str) else words(told)}"
@@ -61,7 +65,19 @@ def tell(
     return 0
 
 
-def _plain_plan(case: Case, known: Sequence[tuple[str, str, Mapping[str, Any] | str]]) -> dict[str, Any]:
+def _conditions(case: Case) -> list[tuple[Case, str]]:
+    """Return what is run of a case, and when: of a file also with the friction of its contacts."""
+    if not case.file:
+        return [(case, "")]
+    from crossbody.cases.files.case import rubbing
+
+    rubs = rubbing(case)
+    return [(case, "")] + ([] if rubs is None else [(rubs, RUBS)])
+
+
+def _plain_plan(
+    case: Case, condition: str, known: Sequence[tuple[str, str, Mapping[str, Any] | str]]
+) -> dict[str, Any]:
     """Return what would be run of one case, as plain values; an engine that would not run has a reason instead."""
     own = [("skipped", told) if isinstance(told, str) else ("settings", _finite(told)) for _, _, told in known]
     engine_rows = [
@@ -69,8 +85,9 @@ def _plain_plan(case: Case, known: Sequence[tuple[str, str, Mapping[str, Any] | 
         for (engine, profile, _), (key, value) in zip(known, own, strict=True)
     ]
     return {
-        "case": case.name, "variant": case.variant, "velocities": len(case.v0), "rows": len(case.contacts),
-        "t_end": case.t_end, "parameters": _finite(case.parameters), "engines": engine_rows,
+        "case": case.name, "variant": case.variant, "if": condition,
+        "velocities": len(case.v0), "rows": len(case.contacts), "t_end": case.t_end,
+        "parameters": _finite(case.parameters), "engines": engine_rows,
     }  # fmt: skip
 
 
