@@ -607,6 +607,15 @@ def test_a_template_is_compiled_once_and_again_when_it_changes(tmp_path, monkeyp
     assert shown("{{ name | length }}") == "11"
 
 
+def test_the_limits_of_position_stand_in_the_picture_of_run_time_over_error(out: Path) -> None:
+    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["metric"] == "position"]
+    limits = sorted({row["limit"] for row in rows if row["limit"]})
+    for page in (out / CASE, out / "index.html"):
+        figure = all_plots(page)["precision"]
+        assert [shape["x0"] for shape in figure["layout"]["shapes"]] == limits
+        assert "Dashed: limit of the error" in page.read_text()
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_names_of_marks_of_one_height_do_not_all_stand_at_it(seed: int) -> None:
     draw = np.random.default_rng(seed)
