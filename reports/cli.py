@@ -275,7 +275,9 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float | No
 
     trace, place = motion(folder, case, engine)
     drawing.write(drawing.Film(trace, place), out, instant, fps, speed)
-    if not quiet():
+    if as_json():
+        result(json.dumps({"picture": str(out.absolute())}))
+    elif not quiet():
         click.echo(f"Picture: {out.absolute()}")
     return 0
 

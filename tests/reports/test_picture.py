@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -93,6 +94,9 @@ def test_the_command_draws_a_stored_run(tmp_path: Path, capsys: pytest.CaptureFi
     assert code_of("run", "bouncing_ball", "--variant", "linear", "-e", "reference:compiled", "--out", out) == 0
     assert code_of("picture", out, str(tmp_path / "a.svg"), "--at", "0.5") == 0
     assert (tmp_path / "a.svg").read_text().startswith("<svg")
+    capsys.readouterr()
+    assert code_of("picture", out, str(tmp_path / "a.png"), "--json") == 0
+    assert json.loads(capsys.readouterr().out) == {"picture": str(tmp_path / "a.png")}
     assert code_of("picture", out, str(tmp_path / "b.svg"), "-e", "nobody") == 2
     assert "truth, reference:compiled" in capsys.readouterr().err
     assert not (tmp_path / "b.svg").is_file()
