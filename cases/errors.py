@@ -30,6 +30,11 @@ SHOWN = 80
 LISTED = 20  # files of a folder that are named at most
 
 
+def several(count: int, one: str, many: str = "") -> str:
+    """Return how many there are of what is called `one`, and otherwise `many`, else with an s."""
+    return f"{count} {one if count == 1 else many or f'{one}s'}"
+
+
 def shown(value: object) -> str:
     """A value in a message: cut where it is long, and never a fault of its own."""
     try:

@@ -58,10 +58,12 @@ def cli() -> None:
 
 
 @cli.command("list")
-@click.argument("name", metavar="[CASE or ENGINE]", required=False, shell_complete=options.names_of("cases", "engines"))
+@click.argument(
+    "name", metavar="[NAME]", required=False, shell_complete=options.names_of("cases", "engines", "hw.models")
+)  # fmt: skip
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
 def list_(name: str | None, plain: bool) -> None:
-    """List all names, or the details of CASE or ENGINE.
+    """List all names, or the details of a case, robot file, engine or model of logs.
 
     Names are those of cases, engines, metrics, stress suites and models of logs.
     """
@@ -251,19 +253,19 @@ def report(folder: Path, **asked: Any) -> int:
 @cli.command()
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @click.argument("out", metavar="FILE", type=options.PATH)
-@click.option("--case", "case", metavar="CASE:V", default="", help="Case and variant; the first if not given.")
+@click.option("--case", "case", metavar="CASE:V", default="", help="Case and variant, if the folder has several.")
 @click.option(
     "--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Engine whose motion is drawn."
 )
 @click.option(
-    "--at", "instant", metavar="S", type=float, default=0.0, show_default=True, help="Time of the picture, s."
+    "--at", "instant", metavar="S", type=float, help="Time of the picture, s; 0 if not given. A GIF has none."
 )
 @click.option("--fps", type=options.ABOVE_0, default=25.0, show_default=True, help="Frames per second of a GIF.")
 @click.option(
     "--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Speed of a GIF, as a multiple of real time."
 )
 @speaks
-def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps: float, speed: float) -> int:
+def picture(folder: Path, out: Path, case: str, engine: str, instant: float | None, fps: float, speed: float) -> int:
     """Draw a motion of an earlier run.
 
     FILE.svg or FILE.png shows one instant, FILE.gif the whole motion.
@@ -273,7 +275,9 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float, fps
 
     trace, place = motion(folder, case, engine)
     drawing.write(drawing.Film(trace, place), out, instant, fps, speed)
-    if not quiet():
+    if as_json():
+        result(json.dumps({"picture": str(out.absolute())}))
+    elif not quiet():
         click.echo(f"Picture: {out.absolute()}")
     return 0
 
@@ -331,8 +335,9 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
 @cli.command()
 @options.replayed
 @click.option(
-    "--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter to fit, or delay; repeatable."
-)
+    "--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter to fit, or delay; repeatable.",
+    shell_complete=options.free_of,
+)  # fmt: skip
 @click.option("--hold", type=int, default=2, show_default=True, help="Hold every N-th window out of the fit; 0: none.")
 @click.option(
     "--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True,

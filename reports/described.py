@@ -1,4 +1,4 @@
-"""What `crossbody list` prints: everything that has a name, or what one case can be asked for."""
+"""What `crossbody list` prints: everything that has a name, or what one of them can be asked for."""
 
 from __future__ import annotations
 
@@ -62,15 +62,23 @@ def engine(name: str) -> Named:
     return {"Profiles": dict(found.profiles), "Settings for bouncing_ball": settings, "Versions": dict(found.versions)}
 
 
+def model(name: str) -> Named:
+    """Return the parameters of a model of logs."""
+    from crossbody.hw import models
+
+    return {"Parameters": {key: _parameter(each) for key, each in models.load(name).parameters.items()}}
+
+
 def one(name: str) -> Named:
-    """Return what can be asked of the case, file or engine of that name."""
+    """Return what can be asked of the case, file, engine or model of that name."""
     from crossbody import cases, engines
     from crossbody.cases.loading import parted
+    from crossbody.hw import models
 
-    known = (*cases.names(), *engines.names())
+    known = (*cases.names(), *engines.names(), *models.names())
     if "." not in name and parted(name)[0] not in known:
-        raise cases.UnknownName("case or engine", name, known)
-    return engine(name) if name in engines.names() else case(name)
+        raise cases.UnknownName("case, engine or model", name, known)
+    return engine(name) if name in engines.names() else model(name) if name in models.names() else case(name)
 
 
 def text(told: Named) -> str:

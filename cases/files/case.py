@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Coordinate, Inputs, Limit, Parameter, Value
 from crossbody.cases.control import Control
-from crossbody.cases.errors import SceneError
+from crossbody.cases.errors import SceneError, several
 from crossbody.cases.files.controls import pushed, read_control, read_controls, under
 from crossbody.cases.files.reading import check_text, existing, findings_of, model_of, read, scene_of
 from crossbody.cases.rotations import normalised
@@ -211,8 +211,9 @@ def case_of(
         raise SceneError(
             f"Row {fast[0]!r} has constants of COLLISION, which the rows of a scene do not have: b0, b1 must be 0."
         )
+    bodies, freedom = several(len(scene.bodies), "body", "bodies"), several(scene.nv, "degree", "degrees")
     return Case(
-        name=name, variant=variant, title=f"{len(scene.bodies)} bodies, {scene.nv} degrees of freedom",
+        name=name, variant=variant, title=f"{bodies}, {freedom} of freedom",
         mechanism="scene", parameters=dict(parameters or {"t_end": t_end}),
         coordinates=coordinates(scene), velocities=coordinates(scene, RATES), quaternions=quaternions(scene),
         contacts=tuple(names), q0=start,

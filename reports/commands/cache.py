@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from multiprocessing import get_context
 
 import click
@@ -13,7 +13,7 @@ import click
 from crossbody import cases, engines
 from crossbody.cases import OutputError
 from crossbody.reference import ahead, code_store
-from crossbody.reference.compiling import silence
+from crossbody.reference.compiling import EVERY_S, silence
 from crossbody.reports import voice
 
 
@@ -21,7 +21,7 @@ def warm() -> int:
     """Compile what is the same for all mechanisms, then the kernels of every case; the exit code."""
     began = time.perf_counter()
     steps = len(ahead.PIECES) + len(cases.names())
-    with voice.progress(steps) as tell, _processes() as pool:
+    with voice.progress(steps, 0) as tell, _processes() as pool:
         _each(pool, ahead.compile_piece, tuple(ahead.PIECES), tell)
         _each(pool, compile_case, cases.names(), tell)
     if not voice.silent():
@@ -37,10 +37,18 @@ def _processes() -> ProcessPoolExecutor:
 def _each(
     pool: ProcessPoolExecutor, work: Callable[[str], None], names: Sequence[str], tell: Callable[[str], None]
 ) -> None:
-    for done in as_completed(found := {pool.submit(work, name): name for name in names}):
-        done.result()
-        tell(found[done])
-        voice.note(f"{found[done]} is compiled")
+    """Do the work on each name, and say what is done, or every few seconds what is not."""
+    found = {pool.submit(work, name): name for name in names}
+    left = set(found)
+    while left:
+        ended, left = wait(left, EVERY_S, FIRST_COMPLETED)
+        for done in ended:
+            done.result()
+            tell(found[done])
+            voice.note(f"{found[done]} is compiled")
+        if not ended:
+            first = [name for one, name in found.items() if one in left][: ahead.processors()]
+            voice.note(f"compiling {', '.join(first)}; {len(left)} of {len(names)} to go")
 
 
 def compile_case(name: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import wraps
 from importlib import import_module
@@ -32,14 +32,45 @@ def together(command: _Work, *options: Any) -> _Work:
 
 
 def names_of(*modules: str) -> Callable[[click.Context, click.Parameter, str], list[CompletionItem]]:
-    """Return what a shell completes to names that modules of crossbody tell (`names`), or to files where none fits."""
+    """Return what a shell completes to names that modules of crossbody tell (`names`), or to files where none fits.
+
+    Behind a colon stand the variants of a case and the profiles of an engine.
+    """
 
     def fitting(_context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
         known = [name for module in modules for name in import_module(f"crossbody.{module}").names()]
+        head, colon, _ = begun.partition(":")
+        if colon and head in known:
+            known = [f"{head}:{one}" for module in modules for one in _kinds(module, head)]
         found = [CompletionItem(name) for name in known if name.startswith(begun)]
         return found or [CompletionItem(begun, type="file")]
 
     return fitting
+
+
+def _kinds(module: str, name: str) -> Iterable[str]:
+    """Return the variants of a case or the profiles of an engine, if it is one that a shell completes."""
+    from crossbody import cases, engines
+
+    with suppress(cases.CrossbodyError):
+        if module == "cases":
+            return cases.variants(name)
+        if module == "engines":
+            return engines.load(name).profiles
+    return ()
+
+
+def free_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Return what a shell completes to parameters that may be fitted: of the model, or of all where none is given."""
+    from crossbody import cases
+    from crossbody.hw import models
+
+    found: dict[str, str] = {"delay": "of the measured coordinates, s"}
+    given = context.params.get("model")
+    for name in [given] if given else models.names():
+        with suppress(cases.CrossbodyError):
+            found |= {key: one.doc for key, one in models.load(name).parameters.items()}
+    return [CompletionItem(name, help=doc) for name, doc in found.items() if name.startswith(begun)]
 
 
 def _given(context: click.Context) -> list[str]:

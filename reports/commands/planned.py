@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,10 +11,14 @@ import click
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Value
-from crossbody.reports import layout
+from crossbody.cases.errors import several
+from crossbody.reports import layout, voice
 from crossbody.reports.judging.stored import words
 from crossbody.reports.pages import results
 from crossbody.reports.runs import choice, output
+
+RUBS = "if its motion comes to a contact with friction"
+"""When the rows of a file's contacts are run: the motion tells, which a plan does not follow."""
 
 
 def checked(
@@ -44,15 +49,50 @@ def tell(
     """Print what `run` would do with the same words; the exit code."""
     cases = choice.load_cases(names, variant, choice.parse_settings(pairs), limit)
     picks, asked = checked(wanted, rtol, settings, out, against, others)
-    found = [(case, _planned(case, picks, asked, rtol)) for case in cases]
-    for case, known in found:
+    each = [(case, condition) for one in cases for case, condition in _conditions(one)]
+    found = [(case, condition, _planned(case, picks, asked, rtol)) for case, condition in each]
+    if voice.as_json():
+        voice.result(json.dumps([_plain_plan(*one) for one in found], default=str))
+        return 0
+    for case, condition, known in found:
         parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
-        click.echo(f"{case.label}: {len(case.v0)} velocities, {len(case.contacts)} rows, {case.t_end:g} s")
+        counts = f"{several(len(case.v0), 'velocity', 'velocities')}, {several(len(case.contacts), 'row')}"
+        click.echo(layout.told(f"{case.label}{condition and f', {condition}'}: {counts}, {case.t_end:g} s"))
         click.echo(layout.told(f"  parameters: {parameters}") if parameters else "  no parameters")
         for engine, profile, told in known:
             line = f"  {engine}:{profile}  {told if isinstance(told, str) else words(told)}"
             click.echo(layout.told(line.rstrip()))
     return 0
+
+
+def _conditions(case: Case) -> list[tuple[Case, str]]:
+    """Return what is run of a case, and when: of a file also with the friction of its contacts."""
+    if not case.file:
+        return [(case, "")]
+    from crossbody.cases.files.case import rubbing
+
+    rubs = rubbing(case)
+    return [(case, "")] + ([] if rubs is None else [(rubs, RUBS)])
+
+
+def _plain_plan(
+    case: Case, condition: str, known: Sequence[tuple[str, str, Mapping[str, Any] | str]]
+) -> dict[str, Any]:
+    """Return what would be run of one case, as plain values; an engine that would not run has a reason instead."""
+    own = [("skipped", told) if isinstance(told, str) else ("settings", _finite(told)) for _, _, told in known]
+    engine_rows = [
+        {"engine": engine, "profile": profile, key: value}
+        for (engine, profile, _), (key, value) in zip(known, own, strict=True)
+    ]
+    return {
+        "case": case.name, "variant": case.variant, "if": condition,
+        "velocities": len(case.v0), "rows": len(case.contacts), "t_end": case.t_end,
+        "parameters": _finite(case.parameters), "engines": engine_rows,
+    }  # fmt: skip
+
+
+def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: voice.finite(value) for name, value in values.items()}
 
 
 def _planned(

@@ -13,6 +13,7 @@ import pandas as pd
 
 from crossbody import hw
 from crossbody.cases import CaseUnsupported
+from crossbody.cases.errors import several
 from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import layout, voice
 from crossbody.reports.commands.shared import identity, print_rows, where
@@ -227,7 +228,7 @@ def _say_outside(rows: pd.DataFrame) -> None:
 
 def _say(found: Comparison, metrics: pd.DataFrame) -> None:
     source = f"{replay.tier(found.log)}: {found.log.provenance.file}"
-    click.echo(layout.told(f"{source} on {found.model}, {len(found.windows)} windows"))
+    click.echo(layout.told(f"{source} on {found.model}, {several(len(found.windows), 'window')}"))
     for one in replay.findings(found).to_dict(orient="records"):
         if one["what"] != "repair":
             place = f"{one['channel']}, row {one['row']}: " if one["channel"] else ""

@@ -7,14 +7,16 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.judging.parts import PARTS, SPLIT, part_of
+from crossbody.reports.judging.verdict import IDENTITIES, Row, Word
 from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
 SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$)")
 """What a truth's row says of a horizon shorter than was asked for, or a motion known in part."""
 FINISHED = "finished"  # the row that says whether a run came to its end
+_CLAUSE = re.compile(r"[:;,.](?:\s|$)")
+"""What ends the first clause of a reason."""
 NAMED = 3  # runs that the sentence names
 
 
@@ -50,15 +52,14 @@ class EngineRun:
         return held or bool(self.wrong) or self.unbounded is not None
 
     @property
-    def deviates(self) -> bool:
-        """Whether a number is beyond its limit within bounds that are known of the engine."""
-        return any(row["verdict"] == Word.EXPECTED for row in self.rows)
+    def deviates(self) -> Row | None:
+        """The number beyond its limit within bounds that are known of the engine: of position if there is one."""
+        return max((row for row in self.rows if row["verdict"] == Word.EXPECTED), key=_telling, default=None)
 
     @property
     def unbounded(self) -> Row | None:
         """The number beyond its limit that may be so, unknown how far: of position if there is one."""
-        found = filter(beyond, self.rows)
-        return max(found, key=lambda row: (row["metric"] == "position", share(row)), default=None)
+        return max(filter(beyond, self.rows), key=_telling, default=None)
 
     @property
     def skipped(self) -> bool:
@@ -88,6 +89,11 @@ def share(row: Row) -> float:
     return off / limit if limit > 0.0 and math.isfinite(off) else math.inf
 
 
+def _telling(row: Row) -> tuple[bool, bool, float]:
+    """How much of a run a number beyond its limit tells: most if it is of position, then if it is far out."""
+    return row["metric"] == "position", math.isfinite(share(row)), share(row)
+
+
 def sentence(runs: Sequence[EngineRun]) -> str:
     """Say how many runs are within all limits, which have known deviations, and which are off and why."""
     all_ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
@@ -96,9 +102,13 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         return "Nothing is judged, since no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
     right = [run for run in ran if not run.wrong]
-    known = [run.who for run in right if run.deviates]
+    known = [(run, row) for run in right if (row := run.deviates)]
     loose = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
-    text = _counted(len(right) - len(known) - len(loose), len(ran), known)
+    text = _counted(len(right) - len(known) - len(loose), len(ran), [run.who for run, _ in known])
+    if known:
+        run, row = max(known, key=lambda one: _telling(one[1]))
+        cause = _CLAUSE.split(row["why"])[0]
+        text += f" The largest deviation: {_off(run, row)}: {cause[:1].upper()}{cause[1:]}."
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     if off:
@@ -150,7 +160,17 @@ def _off(run: EngineRun, row: Row) -> str:
 
 
 def _blamed(run: EngineRun, metric: str) -> str:
-    """The part that is more than half of an error, where its parts are known."""
+    """The part that is more than half of an error; of a number without parts, that of an error beside it."""
+    if part := _most(run, metric):
+        return f", mostly its {part}"
+    beyond_too = {row["metric"] for row in run.rows if row["verdict"] in (*WRONG, Word.EXPECTED) or beyond(row)}
+    if metric in (*SPLIT, *IDENTITIES, "audit"):
+        return ""  # parts of motions say nothing of what an engine was given
+    found = ((name, _most(run, name)) for name in SPLIT if name in beyond_too)
+    return next((f"; its error of {name}: mostly the {part}" for name, part in found if part), "")
+
+
+def _most(run: EngineRun, metric: str) -> str:
     values = {row["metric"]: abs(row["value"]) for row in run.rows if row["value"] is not None}
     most = [part for part in PARTS if values.get(part_of(metric, part), 0.0) > 0.5 * values.get(metric, math.nan)]
-    return f", mostly its {' and '.join(most)}" if most else ""
+    return " and ".join(most)

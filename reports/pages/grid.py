@@ -125,9 +125,14 @@ def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | No
     return Cell(title=title, word=word, text=text, small=small, page=page, anchor=who, heat=heat)
 
 
+def held(row: Row) -> bool:
+    """Whether a number can be set beside a limit: it is judged, or beyond one for a known cause."""
+    return row["verdict"] in WORST or beyond(row)
+
+
 def heat_of(row: Row) -> int:
-    """How many decades a judged number is from its limit, as a step of its colour; within, less is more."""
-    if row["verdict"] not in WORST:
+    """How many decades a number is from its limit, as a step of its colour; within, less is more."""
+    if not held(row):
         return -1
     times = share(row)
     decades = math.log10(times) if 0.0 < times < math.inf else -math.inf if times == 0.0 else math.inf
@@ -162,7 +167,7 @@ def _cost(wall: float | None, least: float) -> Cell:
 
 
 def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
-    judged = [row for row in rows if row["verdict"] in WORST]
+    judged = list(filter(held, rows))
     far: dict[str, float] = {}
     for row in judged:
         far[row["metric"]] = max(far.get(row["metric"], 0.0), share(row))

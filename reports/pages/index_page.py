@@ -141,12 +141,11 @@ def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
 
 
 def _worst(found: Results, case: CaseFiles) -> str:
-    """What is outside the farthest, in a few words."""
-    wrong = [row for row in found.rows.get(case.label, ()) if row["verdict"] in WRONG]
-    if not wrong:
-        return ""
-    row = max(wrong, key=share)
-    return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}"
+    """The number of the worst word that is farthest out, in a few words; one without a limit only if it is wrong."""
+    held = [row for row in found.rows.get(case.label, ()) if grid.held(row) and share(row) > 0.0]
+    known = [row for row in held if row["verdict"] in WRONG or math.isfinite(share(row))]
+    row = max(known, key=lambda row: (-grid.RANKED.index(row["verdict"]), share(row)), default=None)
+    return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}" if row else ""
 
 
 def _sketch(case: CaseFiles) -> str:

@@ -237,11 +237,13 @@ def raster(strokes: Sequence[Stroke]) -> Any:
     return image.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
 
 
-def write(film: Film, path: Path, t: float, fps: float, speed: float) -> None:
-    """Write an SVG or PNG of one instant, s, or the motion as a GIF of fps at so many times real time."""
-    end = float(film.t[-1])
+def write(film: Film, path: Path, instant: float | None, fps: float, speed: float) -> None:
+    """Write an SVG or PNG of one instant, s, else of the start, or the motion as a GIF of fps at times real time."""
+    t, end = instant or 0.0, float(film.t[-1])
     if path.suffix not in SUFFIXES:
         raise InvalidValue(f"{path.name} is not a known kind of picture; valid: {', '.join(SUFFIXES)}.")
+    if path.suffix == ".gif" and instant is not None:
+        raise InvalidValue(f"{path.name} would show the whole motion; --at is for an SVG or PNG of one instant.")
     if not 0.0 <= t <= end:
         raise InvalidValue(f"{t:g} s is outside the motion, which lasts from 0 to {end:g} s.")
     if path.suffix == ".gif":

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports.figures.section import Figure, Plot, Section
-from crossbody.reports.figures.styles import COLOURS, plain
+from crossbody.reports.figures.styles import COLOURS, LEVEL, plain
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
 
+LINE = {"color": LEVEL, "dash": "dash", "width": 1}
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")
 FLOOR = 1e-16
 RUNS = (
@@ -45,7 +46,7 @@ def precision(
         (row["who"], float(row["value"]), 1e3 * walls[row["who"]]) for row in rows
         if row["metric"] == "position" and row["value"] is not None and walls.get(row["who"])
     ]  # fmt: skip
-    return [_section(scatter(points, places), RUNS)] if points else []
+    return [_section(scatter(points, places, _limits(rows)), RUNS)] if points else []
 
 
 def overview(found: Results) -> list[Section]:
@@ -59,7 +60,8 @@ def overview(found: Results) -> list[Section]:
     if not points:
         return []
     if len(found.rows) == 1:
-        return [_section(scatter([(who, error, ms) for who, ((_, error, ms),) in points.items()], found.places), RUNS)]
+        marks = [(who, error, ms) for who, ((_, error, ms),) in points.items()]
+        return [_section(scatter(marks, found.places, _limits(next(iter(found.rows.values())))), RUNS)]
     return [_section(cloud(points, found.places), ALL)]
 
 
@@ -111,8 +113,15 @@ def _sides(heights: Sequence[float]) -> list[str]:
     return [found[i] for i in range(len(heights))]
 
 
-def scatter(points: Sequence[tuple[str, float, float]], places: Mapping[str, int]) -> Figure:
-    """One mark an engine: error of position (relative), run time in ms."""
+def _limits(rows: Sequence[Row]) -> list[float]:
+    """Return the limits on the error of position."""
+    return sorted({row["limit"] for row in rows if row["metric"] == "position" and (row["limit"] or 0.0) > 0.0})
+
+
+def scatter(
+    points: Sequence[tuple[str, float, float]], places: Mapping[str, int], limits: Sequence[float] = ()
+) -> Figure:  # fmt: skip
+    """One mark an engine: error of position (relative), run time in ms; its limits are dashed."""
     finite = [error for _, error, _ in points if math.isfinite(error)]
     edge = 10.0 * max([*finite, FLOOR])
     data = [
@@ -127,8 +136,12 @@ def scatter(points: Sequence[tuple[str, float, float]], places: Mapping[str, int
         }
         for (who, error, ms), side in zip(points, _sides([ms for *_, ms in points]), strict=True)
     ]  # fmt: skip
+    told = f". Dashed: {'limits' if len(limits) > 1 else 'limit'} of the error" if limits else ""
     layout = {
-        "title": {"text": "Run time against error of position"}, "height": 420, "showlegend": False,
+        "title": {"text": f"Run time against error of position{told}"}, "height": 420, "showlegend": False,
+        "shapes": [
+            {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in limits
+        ],
         "xaxis": _decades("relative error of position", [max(error, FLOOR) for error in finite]),
         "yaxis": _decades("run time [ms]", [ms for _, _, ms in points]),
     }  # fmt: skip

@@ -194,9 +194,13 @@ def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
 
     verdicts = verdicts_of(out)
     found = _cases(out, verdicts, places_of(verdicts))[0]
-    mine = next((one for one in found if one.paths and case in ("", one.label)), None)
-    if mine is None:
-        raise InvalidValue(f"{out} has no motion of {case or 'a case'}; it has {_listed(one.label for one in found)}.")
+    drawable = [one for one in found if one.paths and case in ("", one.label)]
+    listed = _listed(one.label for one in found)
+    if not drawable:
+        raise InvalidValue(f"{out} has no motion of {case or 'a case'}; it has {listed}.")
+    if len(drawable) > 1:
+        raise InvalidValue(f"{out} has motions of several cases; choose one with --case: {listed}.")
+    mine = drawable[0]
     traces = mine.traces()
     names = [label(trace) for trace in traces]
     place = next((i for i, name in enumerate(names) if engine in (name, name.partition(":")[0])), None)

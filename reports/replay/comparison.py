@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from crossbody.cases import InvalidValue, Limit, UnknownName
+from crossbody.cases.errors import several
 from crossbody.hw import Comparison, Fit, Log, Prediction
 from crossbody.hw.replaying.comparison import Row
 from crossbody.reports.judging.verdict import COLUMNS, Verdict, Word, judge, limit_for
@@ -115,7 +116,7 @@ def verdicts(found: Comparison, command: str, given: Sequence[Limit] = (), fit: 
         fit: the identification that the parameters come from, whose held-out error is judged too.
     """
     rules = (*found.limits, *given)
-    source = f"{found.kind}, {len(found.windows)} windows of {found.log.provenance.file}"
+    source = f"{found.kind}, {several(len(found.windows), 'window')} of {found.log.provenance.file}"
 
     def row(engine: str, profile: str, **more: Any) -> Verdict:
         return Verdict(

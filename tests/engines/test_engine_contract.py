@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, EngineUnavailable, InvalidValue, Trajectory, UnknownName
 from crossbody.cases.files.case import case_of
 from crossbody.engines import Engine, Run
+from crossbody.reports.cli import main
 from crossbody.reports.commands.planned import tell
 
 T_END = 0.8
@@ -223,6 +225,26 @@ def test_versions_are_stated(name: str) -> None:
     assert FOUND[name].name == name
     assert FOUND[name].versions
     assert all(version[0].isdigit() for version in FOUND[name].versions.values())
+
+
+ROUGH = '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1" condim="3"/><body pos="0 0 .5"><freejoint/>' \
+    '<geom name="box" type="box" size=".1 .1 .1" condim="3"/></body></worldbody></mujoco>'  # fmt: skip
+
+
+def test_a_plan_of_a_file_has_both_what_runs_without_a_contact_and_with_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    (tmp_path / "box.xml").write_text(ROUGH)
+    asked = ("-e", "reference:compiled", "-e", "mujoco:matched", "--dry-run", "--json")
+    with pytest.raises(SystemExit) as end:
+        main(["run", str(tmp_path / "box.xml"), *asked])
+    assert not end.value.code
+    free, rubs = json.loads(capsys.readouterr().out)
+    assert (free["if"], free["rows"]) == ("", 0)
+    assert all("settings" in one for one in free["engines"])
+    assert (rubs["if"], rubs["rows"]) == ("if its motion comes to a contact with friction", 24)
+    assert ["skipped" in one for one in rubs["engines"]] == [False, True]
 
 
 def test_a_dry_run_builds_nothing_of_the_reference(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

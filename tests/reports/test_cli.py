@@ -286,10 +286,35 @@ def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.Cap
     words = ("-e", "fake", "-e", "absent", "--set", "t_end=2", "--set-engine", "fake:off.dt=4e-3", "--dry-run")
     assert call(*LINEAR, *words) == 0
     said = capsys.readouterr().out
-    assert "bouncing_ball:linear: 1 velocities, 1 rows, 2 s" in said
+    assert "bouncing_ball:linear: 1 velocity, 1 row, 2 s" in said
     assert "fake:exact  dt=0.001" in said
     assert "fake:off  dt=0.004" in said
     assert "absent:*  skipped: Engine 'absent' needs" in said
+    assert list(Path.cwd().iterdir()) == []
+
+
+def test_a_plan_as_json_says_what_the_plan_says(capsys: pytest.CaptureFixture[str]) -> None:
+    words = (
+        "-e",
+        "fake",
+        "-e",
+        "absent",
+        "--set",
+        "t_end=2",
+        "--set-engine",
+        "fake:off.dt=4e-3",
+        "--dry-run",
+        "--json",
+    )
+    assert call(*LINEAR, *words) == 0
+    (told,) = json.loads(capsys.readouterr().out)
+    case = cases.load("bouncing_ball", "linear", t_end=2.0)
+    assert (told["case"], told["variant"]) == ("bouncing_ball", "linear")
+    assert (told["velocities"], told["rows"], told["t_end"]) == (1, 1, 2.0)
+    assert told["parameters"] == dict(case.parameters)
+    known = {f"{one['engine']}:{one['profile']}": one.get("settings", one.get("skipped")) for one in told["engines"]}
+    assert (known["fake:exact"]["dt"], known["fake:off"]["dt"]) == (1e-3, 4e-3)
+    assert "needs" in known["absent:*"]
     assert list(Path.cwd().iterdir()) == []
 
 

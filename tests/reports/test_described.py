@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from crossbody import cases, engines
 from crossbody.cases import loading
+from crossbody.hw import models
 from crossbody.reports import described, metrics
 from crossbody.reports.cli import cli
 
@@ -38,6 +39,13 @@ def test_an_engine_is_listed_with_its_profiles(name: str) -> None:
     settings, ball = told["Settings for bouncing_ball"], cases.load("bouncing_ball")
     assert settings.keys() == {one for one in told["Profiles"] if engines.load(name).why_not(ball, one) is None}
     assert all("max_steps=" in line for line in settings.values())
+
+
+@pytest.mark.parametrize("name", models.names())
+def test_a_model_is_listed_with_its_parameters(name: str) -> None:
+    told, model = described.one(name)["Parameters"], models.load(name)
+    assert list(told) == list(model.parameters)
+    assert all(told[key].startswith(one.doc) and one.unit in told[key] for key, one in model.parameters.items())
 
 
 def test_an_unknown_case_is_a_sentence() -> None:

@@ -27,7 +27,9 @@ def test_a_command_ends_as_well_without_a_stream(number: int) -> None:
 @pytest.mark.parametrize(("words", "wanted"), [
     ("run bounc", "plain,bouncing_ball"), ("run red_body -e muj", "plain,mujoco"), ("list pin", "plain,pinocchio"),
     ("run red_body --variant fr", "plain,frozen"), ("replay -m ba", "plain,ball"), ("gapm", "plain,gapmap"),
-    ("run ./robot", "file,./robot"),
+    ("run ./robot", "file,./robot"), ("run bouncing_ball:lin", "plain,bouncing_ball:linear"),
+    ("run bouncing_ball -e mujoco:m", "plain,mujoco:matched"), ("run robot.xml:st", "file,robot.xml:st"),
+    ("identify -m single_pendulum -f del", "plain,delay"), ("identify -f del", "plain,delay"),
 ])  # fmt: skip
 def test_a_shell_completes_commands_and_names(words: str, wanted: str) -> None:
     asked = {"COMP_WORDS": f"crossbody {words}", "COMP_CWORD": str(len(words.split()))}

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from html import unescape
+from html import escape, unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -344,6 +344,25 @@ def test_a_cell_is_the_warmer_the_farther_out(word: Word) -> None:
     assert heat(np.nan) == 6
 
 
+@pytest.mark.parametrize("seed", range(50))
+def test_what_is_beyond_a_limit_for_a_known_cause_is_as_warm_and_as_high_as_what_is_outside(seed: int) -> None:
+    """The word of a number says who is to blame; its colour and its place say how far out it is."""
+    rng = np.random.default_rng(seed)
+    times = 10.0 ** rng.uniform(-3.0, 5.0, 8)
+    words = [(Word.INFO, Word.OUTSIDE)[rng.integers(2)] if size > 1.0 else Word.WITHIN for size in times]
+    rows = [
+        Verdict(case="c", variant="v", engine="e", profile="p", metric=f"m{i}", value=size, unit="1", limit=1.0,
+                tier="A", verdict=word).row() | {"who": "e:p"}
+        for i, (size, word) in enumerate(zip(times, words, strict=True))
+    ]  # fmt: skip
+    lines = grid.of_case(rows, "page", "c:v", {})[2:]
+    assert [line.text for line in lines] == [f"m{i}" for i in np.argsort(-times)]
+    for line in lines:
+        size = times[int(line.text[1:])]
+        assert size < 1.0 or line.cells[0].heat == min(int(np.log10(size)), 6)
+        assert line.cells[0].heat >= 0
+
+
 def test_what_is_farthest_out_stands_first(out: Path) -> None:
     text = (out / CASE).read_text().replace("<wbr>", "")
     body = text[text.index('--glance">') :]
@@ -353,6 +372,15 @@ def test_what_is_farthest_out_stands_first(out: Path) -> None:
     order = [far[name] for name in shown if name in far]
     assert len(order) > 10
     assert order == sorted(order, reverse=True)
+
+
+def test_the_index_names_the_number_of_a_case_that_is_farthest_out_of_those_of_the_worst_word(out: Path) -> None:
+    text = (out / "index.html").read_text().replace("<wbr>", "")
+    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if grid.held(row)]
+    worst = min(grid.RANKED.index(row["verdict"]) for row in rows)
+    far = max((row for row in rows if grid.RANKED.index(row["verdict"]) == worst), key=share)
+    named = escape(f"{far['engine']}:{far['profile']}: {far['metric']} {grid.short(far['value'])}")
+    assert f"<small>{named}</small>" in text
 
 
 def test_engines_look_different(result: CaseResult) -> None:
@@ -577,6 +605,15 @@ def test_a_template_is_compiled_once_and_again_when_it_changes(tmp_path, monkeyp
         changed.setattr(Environment, "compile", None)
         assert shown("{{ name }}") == first
     assert shown("{{ name | length }}") == "11"
+
+
+def test_the_limits_of_position_stand_in_the_picture_of_run_time_over_error(out: Path) -> None:
+    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["metric"] == "position"]
+    limits = sorted({row["limit"] for row in rows if row["limit"]})
+    for page in (out / CASE, out / "index.html"):
+        figure = all_plots(page)["precision"]
+        assert [shape["x0"] for shape in figure["layout"]["shapes"]] == limits
+        assert "Dashed: limit of the error" in page.read_text()
 
 
 @pytest.mark.parametrize("seed", range(20))

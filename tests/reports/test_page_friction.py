@@ -12,7 +12,7 @@ from crossbody.cases import Mode, load
 from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load as load_engine
 from crossbody.reports.measuring.friction import rubbing
-from crossbody.reports.pages.friction import friction
+from crossbody.reports.pages.friction import friction, hysteresis
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.scenes.scene import slip
@@ -90,6 +90,17 @@ def test_one_contact_of_several_is_chosen_the_most_loaded_first() -> None:
     for name, plots in section.choices.items():
         assert name in case.contacts
         assert all(name in plot.figure["layout"]["title"]["text"] for plot in plots)
+
+
+def test_a_force_stands_over_depth_for_every_contact_and_no_row_of_friction(trace: Trace) -> None:
+    """A row along a surface has no depth."""
+    case = load(trace.about["case"], trace.about["variant"])
+    assert case.scene is not None
+    normals = {name for one in contacts(case.scene) for name in one.normals}
+    chosen = [name for section in hysteresis([trace]) for name in section.choices]
+    moves = np.abs(trace.run.gap).max(axis=0) > 0.0  # a block that only slides has no depth either
+    pressed = {name for name in normals if moves[(k := case.contacts.index(name))] and trace.run.lam[:, k].any()}
+    assert set(chosen) == pressed
 
 
 def test_without_friction_there_is_no_such_section() -> None:

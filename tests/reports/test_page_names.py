@@ -125,6 +125,40 @@ def test_limits_are_named_in_full_over_the_lines(page: Path, browser: chromium.B
     assert sorted(told) == sorted(drawn)
 
 
+def test_lines_over_a_force_are_named_beside_their_plot(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    box = "document.querySelector('[id$=plot-hysteresis]')"
+    browser.wait(f"({box}.scrollIntoView(), 'drawn' in {box}.dataset)")
+    key = f"{box}.parentElement.querySelectorAll('.curves [data-line]')"
+    drawn = browser.js(f"{box}.data.map(({{ meta }}) => meta)")
+    assert len(drawn) > 1
+    assert browser.js(f"[...{key}].map((one) => one.textContent)") == drawn
+    for hidden in (True, False):
+        browser.js(f"document.querySelector('[data-show=\"{drawn[0]}\"]').click()")
+        assert browser.js(f"[...{key}].find((one) => one.dataset.line === '{drawn[0]}').hidden") is hidden
+
+
+def test_an_engine_that_is_hidden_has_no_column(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    seen = """(() => { const table = document.querySelector('.matrix');
+        const shown = (cells) => [...cells].filter((cell) => !cell.hidden);
+        const groups = shown(table.querySelectorAll('[scope=colgroup]')).map((one) => [one.textContent, one.colSpan]);
+        const rows = [...table.querySelectorAll('tr')].slice(1);
+        return [Object.fromEntries(groups), rows.map((row) => shown(row.cells).length)];
+    })()"""
+    hide = (
+        'document.querySelectorAll(\'[data-show="fake:p3"], [data-show="early:stops"]\').forEach((one) => one.click())'
+    )
+    before, all_ = browser.js(seen)
+    browser.js(hide)
+    after, left = browser.js(seen)
+    assert before == after | {"fake": 8, "early": 1}
+    assert after["fake"] == 7
+    assert left == [count - 2 for count in all_]
+    browser.js(hide)
+    assert browser.js(seen) == [before, all_]
+
+
 def test_a_narrow_screen_has_names_below_the_title(page: Path, browser: chromium.Browser) -> None:
     browser.open(page, width=400)
     browser.wait(DRAW)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -62,7 +63,7 @@ def test_in_space_a_plane_and_a_solid_are_drawn_around_the_middle() -> None:
 
 def test_files_of_every_kind(ball: Film, tmp_path: Path) -> None:
     for suffix in picture.SUFFIXES:
-        picture.write(ball, tmp_path / f"ball{suffix}", 0.0, 4.0, 1.0)
+        picture.write(ball, tmp_path / f"ball{suffix}", None, 4.0, 1.0)
     text = (tmp_path / "ball.svg").read_text()
     assert re.match(r"<svg [^>]*viewBox", text)
     assert text.count("<poly") == len(ball.at(0.0))
@@ -75,9 +76,9 @@ def test_files_of_every_kind(ball: Film, tmp_path: Path) -> None:
         assert np.abs(first - np.asarray(gif.convert("RGB"), dtype=float)).max() > 50.0
 
 
-@pytest.mark.parametrize(("name", "t"), [("x.bmp", 0.0), ("x.svg", -1.0), ("x.svg", 99.0)])
+@pytest.mark.parametrize(("name", "t"), [("x.bmp", 0.0), ("x.svg", -1.0), ("x.svg", 99.0), ("x.gif", 0.0)])
 def test_what_cannot_be_drawn_is_refused(ball: Film, tmp_path: Path, name: str, t: float) -> None:
-    with pytest.raises(InvalidValue, match=r"valid: \.svg|lasts from 0 to"):
+    with pytest.raises(InvalidValue, match=r"valid: \.svg|lasts from 0 to|the whole motion"):
         picture.write(ball, tmp_path / name, t, 25.0, 1.0)
     assert not list(tmp_path.iterdir())
 
@@ -93,6 +94,20 @@ def test_the_command_draws_a_stored_run(tmp_path: Path, capsys: pytest.CaptureFi
     assert code_of("run", "bouncing_ball", "--variant", "linear", "-e", "reference:compiled", "--out", out) == 0
     assert code_of("picture", out, str(tmp_path / "a.svg"), "--at", "0.5") == 0
     assert (tmp_path / "a.svg").read_text().startswith("<svg")
+    capsys.readouterr()
+    assert code_of("picture", out, str(tmp_path / "a.png"), "--json") == 0
+    assert json.loads(capsys.readouterr().out) == {"picture": str(tmp_path / "a.png")}
     assert code_of("picture", out, str(tmp_path / "b.svg"), "-e", "nobody") == 2
     assert "truth, reference:compiled" in capsys.readouterr().err
     assert not (tmp_path / "b.svg").is_file()
+
+
+def test_a_folder_of_several_cases_is_asked_which_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, made = str(tmp_path / "out"), tmp_path / "a.svg"
+    labels = ("bouncing_ball:linear", "bouncing_ball:resting")
+    assert code_of("run", *labels, "-e", "reference:compiled", "--out", out) == 0
+    assert code_of("picture", out, str(made)) == 2
+    assert f"choose one with --case: {', '.join(labels)}." in " ".join(capsys.readouterr().err.split())
+    assert not made.exists()
+    assert code_of("picture", out, str(made), "--case", labels[1]) == 0
+    assert made.is_file()

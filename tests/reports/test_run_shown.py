@@ -104,6 +104,19 @@ def test_the_sentence_names_who_is_off_by_how_much_and_by_which_part() -> None:
     assert "mujoco:matched on ball:v (position 0.005, 50 times its limit, mostly its model)" in text
 
 
+@pytest.mark.parametrize("metric", ["restitution_error", "largest position (step)", "audit", "start_error"])
+@pytest.mark.parametrize("position", [Word.WITHIN, Word.OUTSIDE])
+def test_a_number_without_parts_is_blamed_on_what_is_wrong_in_the_motion(metric: str, position: Word) -> None:
+    """But not what an engine was given, and not where the motion is right."""
+    rows = [
+        row("b", metric, 5e-4, Word.OUTSIDE, 1e-6), row("b", "position", 5e-5, position, 1e-5),
+        row("b", part_of("position", "model"), 3e-6, Word.INFO), row("b", part_of("position", "step"), 5e-5, Word.INFO),
+    ]  # fmt: skip
+    blamed = position == Word.OUTSIDE and metric not in ("audit", "start_error")
+    said = "; its error of position: mostly the step" if blamed else ""
+    assert f"b:matched on ball:v ({metric} 0.0005, 5e+02 times its limit{said})." in sentence(runs_of(rows))
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_what_has_no_number_is_off_the_farthest(value: float) -> None:
     rows = [row("a", "position", 1.0, Word.OUTSIDE, 1e-9), row("b", "lam_impulse", value, Word.OUTSIDE, 1.0)]

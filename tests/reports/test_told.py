@@ -14,6 +14,7 @@ from crossbody.reports.judging.told import NAMED, runs_of, sentence
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid as pages_grid
 
+CAUSE = "soft contacts, of a step: and what follows"
 KINDS = ("within", "expected", "outside", "unbounded", "unlimited", "skipped")
 
 
@@ -33,7 +34,7 @@ def rows_of(who: str, kind: str, times: float) -> list[dict[str, Any]]:
     beyond = {"value": times * 1e-3}
     return [finished, *{
         "within": [row(who, Word.WITHIN), row(who, Word.INFO, "speed", value=7.0, limit=None)],
-        "expected": [row(who, Word.WITHIN, "velocity"), row(who, Word.EXPECTED, **beyond)],
+        "expected": [row(who, Word.EXPECTED, "velocity", value=1.0), row(who, Word.EXPECTED, **beyond, why=CAUSE)],
         "outside": [row(who, Word.OUTSIDE, **beyond), row(who, Word.OUTSIDE, "velocity", value=1.5e-3)],
         "unbounded": [row(who, Word.INFO, **beyond), row(who, Word.WITHIN, "velocity")],
         "unlimited": [row(who, Word.INFO, limit=None)],
@@ -74,6 +75,9 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
     deviating = re.search(r"(\d+|The run) deviates? as expected \((.*?)\)", text)
     assert (deviating[2].split(", ") if deviating else []) == by["expected"]
     assert not deviating or deviating[1] in ("The run", str(len(by["expected"])))
+    if most := max(by["expected"], key=times.__getitem__, default=None):
+        size = f"position {times[most] * 1e-3:.2g}, {times[most]:.2g} times its limit"
+        assert f"The largest deviation: {most} on ball:hard ({size}): Soft contacts. " in f"{text} "
     for kind, begin in (("outside", "Off:"), ("unbounded", "Beyond a limit for a known cause, and not judged:")):
         farthest = sorted(by[kind], key=lambda who: -times[who])
         assert named(text, begin) == (farthest[:NAMED], max(len(farthest) - NAMED, 0))

@@ -125,6 +125,21 @@ const crossbody = (() => {
       crossbody.tell("engines");
     });
   });
+  const columns = (table) => {
+    const heads = [...table.querySelectorAll("[data-heads] th")];
+    heads.forEach((head, i) => {
+      head.hidden = !crossbody.shown(head.dataset.name.replace(/:$/, ""));
+      table.querySelectorAll("tbody tr").forEach((row) => { row.cells[i + 1].hidden = head.hidden; });
+    });
+    table.querySelectorAll('th[scope="colgroup"]').forEach((group) => {
+      group.dataset.span ||= group.colSpan;
+      const left = heads.splice(0, group.dataset.span).filter((head) => !head.hidden).length;
+      group.hidden = !left;
+      group.colSpan = left || 1;
+    });
+  };
+  crossbody.each(".matrix", columns);
+  crossbody.on("engines", () => document.querySelectorAll(".matrix").forEach(columns));
   crossbody.each("[data-show-all]", (button) => button.addEventListener("click", () => {
     crossbody.hidden.clear();
     crossbody.tell("engines");

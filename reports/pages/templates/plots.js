@@ -75,7 +75,12 @@
   };
   const named = (box, { data, layout }) => {
     const lines = data.filter(own);
-    if (!box.hasAttribute("data-time") || !lines.length) return null;
+    if (!lines.length) return null;
+    if (!box.hasAttribute("data-time")) { // lines in a plane end anywhere, often on each other
+      const engines = lines.filter(({ meta }) => meta);
+      if (layout.showlegend === false && engines.length) below(box, engines);
+      return null;
+    }
     entitle(lines);
     const over = drawing("svg", { class: "names", "aria-hidden": "true" });
     if (box.clientWidth < NARROW) {
