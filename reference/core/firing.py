@@ -38,7 +38,9 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if s.frictional and s.standing > STANDSTILL + s.nc:  # ever sooner before a jam: what goes on is clear of it
         s.jam = s.jam or jams(K, s, m, w, b)
     if s.frictional and _stops_in_a_jam(K, s, m, w, b):
-        return PAINLEVE
+        if _presses_alone(s, m, w, b):
+            return PAINLEVE
+        s.jam = True  # others may go on without it, and no law says which
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
@@ -112,6 +114,16 @@ def _stops_in_a_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
             marks[i] = 1
             return True
     return False
+
+
+@compiled
+def _presses_alone(s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Whether no contact presses but one."""
+    pressing = 0
+    for j in range(s.na):
+        i = w.idx[j]
+        pressing += m.unilateral[i] and m.follows[i] < 0 and b.mode[i] != FREE
+    return pressing == 1
 
 
 @compiled

@@ -303,10 +303,11 @@ class FrictionMachine(LevelMachine):
         if not ends:
             return
         seen, balance = self.weigh(t, q, v)
-        slow = [i for i in balance.ways if np.linalg.norm(self.sliding.slip(seen, i)) <= self.still]
+        pressing = [i for i in self.contacts() if i not in self.sliding.dry]  # others may go on without one that jams
         modes = {i: self.modes[i] for i in self.contacts()}
         for i in (a.row for a in ends):
-            alone = slow == [i] and len(self.sliding.ways[i]) > 1 and i not in self.begun
+            slow = np.linalg.norm(self.sliding.slip(seen, i)) <= self.still
+            alone = slow and pressing == [i] and len(self.sliding.ways[i]) > 1 and i not in self.begun
             if alone and dies_into_jam(self.sliding, seen, modes, balance.ways, i, self.courses.get(i, self.ways[i])):
                 raise Ended(Outcome.PAINLEVE, [i])
 
