@@ -100,11 +100,11 @@ def evaluate_set(s: Any, m: Model, w: Work) -> None:
             pulled = True
     if pulled:
         solve(s, m, w, w.full, w.load)
-        _exceed(s, w, w.full, w.load)
+        exceed(s, w, w.full, w.load)
         for j in range(s.na):
             w.kept_excess[j] = w.excess[j]
     solve(s, m, w, w.bare, w.la)
-    _exceed(s, w, w.bare, w.la)
+    exceed(s, w, w.bare, w.la)
     for j in range(s.na):
         if not pulled:
             w.load[j] = w.la[j]
@@ -113,7 +113,7 @@ def evaluate_set(s: Any, m: Model, w: Work) -> None:
 
 
 @compiled
-def _exceed(s: Any, w: Work, r: Array, la: Array) -> None:
+def exceed(s: Any, w: Work, r: Array, la: Array) -> None:
     """Leave in w.excess by how much faster than r rows move under the multipliers la."""
     for j in range(s.na):
         total = -r[j]
@@ -125,7 +125,7 @@ def _exceed(s: Any, w: Work, r: Array, la: Array) -> None:
 @compiled
 def contradiction(s: Any, w: Work, r: Array, la: Array) -> float:
     """By how many times what is allowed the normal rows that are solved for are off r under the multipliers la."""
-    _exceed(s, w, r, la)
+    exceed(s, w, r, la)
     return apart(s, w)
 
 

@@ -12,6 +12,7 @@ from crossbody.reference.core.friction import has_begun, has_friction, is_dry, s
 from crossbody.reference.core.guards import at_node
 from crossbody.reference.core.jams import determinant
 from crossbody.reference.core.layout import NODES, Model, Work
+from crossbody.reference.core.mode_set import aside, exceed
 from crossbody.reference.core.slips import CLEAR, angle
 
 PARTS, HALVINGS = 48, 40  # of a full turn that are looked at, and between two of these
@@ -43,17 +44,12 @@ def _across(s: Any, m: Model, w: Work, i: int) -> float:
 
     It is 0 where a contact would pull: it lets go on the way, and what follows is another set's.
     """
-    c, total = w.listed[m.tangent[i]], 0.0
     respond(s, m, w, w.pushed, w.la)
     for j in range(s.na):
         if m.unilateral[w.idx[j]] and m.follows[w.idx[j]] < 0 and w.la[j] < 0.0:
             return 0.0
-    for side in range(2):
-        acceleration = -w.pushed[c + side]
-        for k in range(s.na):
-            acceleration += w.gram[c + side, k] * w.la[k]
-        total += acceleration * (w.along[c] if side == 1 else -w.along[c + 1])
-    return float(total)
+    exceed(s, w, w.pushed, w.la)
+    return float(aside(m, w, i))
 
 
 @compiled
@@ -105,13 +101,8 @@ def dies_into_jam(s: Any, m: Model, w: Work, i: int) -> bool:
         return False
     for j in range(s.na):
         k = w.idx[j]
-        if (
-            k != i
-            and has_friction(m, k)
-            and w.slides[k]
-            and not is_dry(m, k)
-            and slip(m, w, k, w.rate) <= small_slip(s)
-        ):
+        slides = has_friction(m, k) and w.slides[k] and not is_dry(m, k)
+        if k != i and slides and slip(m, w, k, w.rate) <= small_slip(s):
             return False  # several turn together
     c = w.listed[m.tangent[i]]
     x, y = w.along[c], w.along[c + 1]

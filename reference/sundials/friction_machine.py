@@ -293,23 +293,23 @@ class FrictionMachine(LevelMachine):
         return above
 
     def _watch_jams(self, t: float, q: Floats, v: Floats, fired: list[Alarm]) -> None:
-        """End where a contact jams whose slip dies out, or whose force changes its sign through infinity.
+        """End where a contact jams that presses alone, and whose slip dies out: others may go on without one.
 
         Raises:
             Ended: PAINLEVE, naming the row.
         """
-        ends = [a for a in fired if a.tells in ("STOP", "JAM", "RELEASE") and self.modes[a.row] == Mode.SLIP]
-        ends = [a for a in ends if a.row not in self.sliding.dry]
-        if not ends:
+        pressing = [i for i in self.contacts() if i not in self.sliding.dry]
+        ending = {alarm.row for alarm in fired if alarm.tells in ("STOP", "JAM", "RELEASE")}
+        if len(pressing) != 1 or not ending.issuperset(pressing):
+            return
+        (i,) = pressing
+        if self.modes[i] != Mode.SLIP or len(self.sliding.ways[i]) == 1 or i in self.begun:
             return
         seen, balance = self.weigh(t, q, v)
-        pressing = [i for i in self.contacts() if i not in self.sliding.dry]  # others may go on without one that jams
-        modes = {i: self.modes[i] for i in self.contacts()}
-        for i in (a.row for a in ends):
-            slow = np.linalg.norm(self.sliding.slip(seen, i)) <= self.still
-            alone = slow and pressing == [i] and len(self.sliding.ways[i]) > 1 and i not in self.begun
-            if alone and dies_into_jam(self.sliding, seen, modes, balance.ways, i, self.courses.get(i, self.ways[i])):
-                raise Ended(Outcome.PAINLEVE, [i])
+        modes = {k: self.modes[k] for k in self.contacts()}
+        slow = np.linalg.norm(self.sliding.slip(seen, i)) <= self.still
+        if slow and dies_into_jam(self.sliding, seen, modes, balance.ways, i, self.courses.get(i, self.ways[i])):
+            raise Ended(Outcome.PAINLEVE, [i])
 
     def apply(self, t: float, q: Floats, v: Floats, fired: list[Alarm]) -> None:
         """Note what fired; `settle` decides what follows from it."""

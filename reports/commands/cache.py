@@ -12,6 +12,7 @@ import click
 
 from crossbody import cases, engines
 from crossbody.cases import OutputError
+from crossbody.cases.errors import several
 from crossbody.reference import ahead, code_store
 from crossbody.reference.compiling import EVERY_S, silence
 from crossbody.reports import voice
@@ -77,7 +78,7 @@ def clear() -> int:
     entries = store.entries() if store else []
     removed = store.clear() if store else 0
     if left := sum(path.exists() for path, _ in entries):
-        files = f"{left} file{'s' if left > 1 else ''} of {code_store.base()}"
+        files = f"{several(left, 'file')} of {code_store.base()}"
         raise OutputError(f"{files} cannot be removed ({removed} were): the folder must be writable.")
     if voice.as_json():
         voice.result(json.dumps({"removed": removed}))

@@ -79,10 +79,10 @@ def _plain_plan(
     case: Case, condition: str, known: Sequence[tuple[str, str, Mapping[str, Any] | str]]
 ) -> dict[str, Any]:
     """Return what would be run of one case, as plain values; an engine that would not run has a reason instead."""
-    own = [("skipped", told) if isinstance(told, str) else ("settings", _finite(told)) for _, _, told in known]
     engine_rows = [
-        {"engine": engine, "profile": profile, key: value}
-        for (engine, profile, _), (key, value) in zip(known, own, strict=True)
+        {"engine": engine, "profile": profile}
+        | ({"skipped": told} if isinstance(told, str) else {"settings": _finite(told)})
+        for engine, profile, told in known
     ]
     return {
         "case": case.name, "variant": case.variant, "if": condition,

@@ -21,6 +21,8 @@ STROKES = {"solid": "none", "dash": "7 4", "dot": "2 3", "dashdot": "7 3 2 3"}
 """The same dashes as lengths, for what plotly does not draw."""
 LEVEL = "#8a8a8a"
 """Of limits and zero lines: seen on light and on dark pages."""
+LINE = {"color": LEVEL, "dash": "dash", "width": 1}
+"""Where a limit, or a bound, is."""
 ACROSS = 0.09  # between two columns, part of the width
 
 

@@ -15,13 +15,12 @@ import numpy as np
 from crossbody.cases import Case, CaseUnsupported, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
-from crossbody.cases.trajectory import Ledger
 from crossbody.engines.contract import QUANTITIES
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import audit
 from crossbody.reports.judging.planted import Range, faults
 from crossbody.reports.judging.truth import agreement
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth, taken
 
 SAME = 1e-12
 """Part of the horizon by which instants are the same."""
@@ -135,14 +134,6 @@ def recorded(run: Trajectory) -> Callable[[Floats], Trajectory]:
     def at(times: Floats) -> Trajectory:
         first = slice(None, len(times))
         same = len(times) <= len(run.t) and np.allclose(times, run.t[first], rtol=0.0, atol=SAME * max(1.0, run.t[-1]))
-        return _part(run, first) if same else other(times)
+        return taken(run, first) if same else other(times)
 
     return at
-
-
-def _part(run: Trajectory, some: slice) -> Trajectory:
-    names = ("t", "q", "v", "gap", "lam", "energy", "mode")
-    book = run.ledger and Ledger(
-        **{name: getattr(run.ledger, name)[some] for name in ("contact", "input", "dissipated")}
-    )
-    return replace(run, **{name: getattr(run, name)[some] for name in names}, ledger=book)

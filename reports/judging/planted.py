@@ -309,7 +309,7 @@ def touches(plain: Plain) -> Iterator[Control]:
         if not (event.before == Mode.FREE and event.after in PUSHES) or not event.t > run.t[0]:
             continue
         gap = np.abs(run.gap[:, event.contact])
-        off = 0.05 * (event.t - max([e.t for e in run.events if e.t < event.t], default=float(run.t[0])))
+        off = 0.05 * _since_last(run, event)
         high = float(np.interp(event.t - off, run.t, gap))
         if sum(e.t == event.t for e in run.events) > 1 or high < FAR * float(gap.max()):
             continue
@@ -319,6 +319,11 @@ def touches(plain: Plain) -> Iterator[Control]:
                 sees: dict[str, Range] = {"event_gap": _left(run, event, early), **more}
                 yield Control(fault=f"a touch {early:.3g} s early", run=shifted(run, [event], -early), sees=sees)
         return
+
+
+def _since_last(run: Trajectory, event: Event) -> float:
+    """Return the time from the instant at which something last happened to an event, s."""
+    return event.t - max([e.t for e in run.events if e.t < event.t], default=float(run.t[0]))
 
 
 def _left(run: Trajectory, event: Event, early: float) -> Range:
@@ -337,7 +342,7 @@ def handed(plain: Plain) -> Iterator[Control]:
     run = plain.run
     ends = [e for e in run.events if (e.before, e.after) == (Mode.COLLISION, Mode.CONTACT)]
     for event in ends[:1]:
-        off = 0.2 * (event.t - max([e.t for e in run.events if e.t < event.t], default=float(run.t[0])))
+        off = 0.2 * _since_last(run, event)
         early = shifted(run, [event], -off)
         yield Control(fault=f"a hand-over {off:.3g} s early", run=early, sees={"mode_times": exactly(off)})
 
@@ -349,7 +354,7 @@ def switched(plain: Plain) -> Iterator[Control]:
     turns = [e for e in run.events if {e.before, e.after} == between]
     for slides, metric in ((False, "stick_times"), (True, "slip_times")):
         for event in [e for e in turns if (e.after == Mode.SLIP) == slides][-1:]:
-            off = 0.05 * (event.t - max([e.t for e in run.events if e.t < event.t], default=float(run.t[0])))
+            off = 0.05 * _since_last(run, event)
             same = [e for e in run.events if e.t == event.t]
             if not _shows(plain, event, event.t - off):
                 continue

@@ -99,21 +99,19 @@ def shortened(truth: Truth) -> Truth:
 
 def before(run: Trajectory, t: float) -> Trajectory:
     """Return a motion up to an instant t, s, with its events, switches and account until then."""
-    kept = run.t <= t
-    booked = run.ledger and Ledger(
-        contact=run.ledger.contact[kept], input=run.ledger.input[kept], dissipated=run.ledger.dissipated[kept]
-    )
     return replace(
-        run, **{name: getattr(run, name)[kept] for name in ("t", "q", "v", "gap", "lam", "energy", "mode")},
-        events=tuple(e for e in run.events if not e.t > t),
-        switches=tuple(s for s in run.switches if not s.t > t), ledger=booked,
+        taken(run, run.t <= t), events=tuple(e for e in run.events if not e.t > t),
+        switches=tuple(s for s in run.switches if not s.t > t),
     )  # fmt: skip
 
 
-def taken(run: Trajectory, some: NDArray[np.intp]) -> Trajectory:
-    """Return some samples of a motion, without its account."""
+def taken(run: Trajectory, some: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Trajectory:
+    """Return some samples of a motion, with its account there."""
     names = ("t", "q", "v", "gap", "lam", "energy", "mode")
-    return replace(run, **{name: getattr(run, name)[some] for name in names}, ledger=None)
+    booked = run.ledger and Ledger(
+        contact=run.ledger.contact[some], input=run.ledger.input[some], dissipated=run.ledger.dissipated[some]
+    )
+    return replace(run, **{name: getattr(run, name)[some] for name in names}, ledger=booked)
 
 
 def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:

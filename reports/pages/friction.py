@@ -12,7 +12,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
-from crossbody.reports.figures.styles import LEVEL, coded, label, plain, style
+from crossbody.reports.figures.styles import LINE, coded, label, plain, style
 from crossbody.reports.pages.figures import carrying, force_unit, robust
 from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs.store import Trace
@@ -25,7 +25,6 @@ OVER_DEPTH = (
     "Force over penetration depth of one contact. A spring gives a line; damping opens it to a loop "
     "whose area is the energy lost. A force below zero pulls."
 )
-LINE = {"color": LEVEL, "dash": "dash", "width": 1}
 DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
 MOST = 1000  # points of one engine's line
 TEXT = (

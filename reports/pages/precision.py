@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports.figures.section import Figure, Plot, Section
-from crossbody.reports.figures.styles import COLOURS, LEVEL, plain
+from crossbody.reports.figures.styles import COLOURS, LINE, plain
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
 
-LINE = {"color": LEVEL, "dash": "dash", "width": 1}
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")
 FLOOR = 1e-16
 RUNS = (
