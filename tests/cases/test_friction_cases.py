@@ -195,6 +195,7 @@ LEG = """<mujoco><compiler angle="radian"/><worldbody><geom name="floor" type="p
   </worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 def test_a_bound_that_bears_nothing_beside_a_contact_that_does_pulls_by_rounding_alone(tmp_path: Path) -> None:
     """A leg falls upright on its foot: the knee stays at its bound, and nothing presses it there."""
     path = tmp_path / "leg.xml"

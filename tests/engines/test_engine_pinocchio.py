@@ -119,6 +119,7 @@ RAIL = """<mujoco><worldbody>
 </worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 def test_what_flies_freely_past_a_shape_touches_it_where_its_parabola_does(tmp_path: Path) -> None:
     # Nothing bends a parabola: a step of the integrator is as long as the flight, up, down past the rail and beyond.
     path, rng, touched = tmp_path / "rail.xml", np.random.default_rng(18), 0

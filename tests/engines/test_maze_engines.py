@@ -233,6 +233,7 @@ def test_ring_is_changed_in_closed_loop_as_by_the_reference():
     np.testing.assert_allclose(motion.q[-1], truth.q[-1], atol=3e-4 * np.abs(truth.q[-1]).max())
 
 
+@pytest.mark.slow
 def test_whole_run_to_the_centre_is_that_of_the_reference():
     """Two programs that share only the geometry's numbers: ring changes of a minute, to 1e-6 s."""
     _, motion = run("solve")

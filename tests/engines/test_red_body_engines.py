@@ -29,7 +29,9 @@ def test_engines_that_follow_the_variant(variant: str, name: str, profile: str, 
     np.testing.assert_allclose(theirs.v[-1], ours.v[-1], atol=100 * off)
 
 
-@pytest.mark.parametrize(("name", "profile"), [("mujoco", "matched"), ("pinocchio", "law")])
+@pytest.mark.parametrize(
+    ("name", "profile"), [pytest.param("mujoco", "matched", marks=pytest.mark.slow), ("pinocchio", "law")]
+)
 def test_a_collision_without_damping_has_its_own_constants(name: str, profile: str) -> None:
     """Rows have two sets by their stiffness: b1 may be 0."""
     pytest.importorskip(name)

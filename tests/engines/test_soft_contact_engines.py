@@ -114,7 +114,10 @@ def test_the_obvious_model_in_mujoco_is_the_same_mechanism_with_softer_contacts(
 HASTE = {"descent": 0.1, "rise": 0.8, "rise_time": 0.3}
 
 
-@pytest.mark.parametrize(("engine", "settings"), [("mujoco", {}), ("pinocchio", {"rtol": 1e-8, "method": "BDF"})])
+@pytest.mark.parametrize(
+    ("engine", "settings"),
+    [("mujoco", {}), pytest.param("pinocchio", {"rtol": 1e-8, "method": "BDF"}, marks=pytest.mark.slow)],
+)
 def test_engines_give_the_run_of_the_reference_on_the_whole_robot(engine, settings):
     """Robot, loops, pads, block and table: touches, releases and the end of a quick grasp."""
     pytest.importorskip(engine)

@@ -116,6 +116,7 @@ def test_integration_steps_are_as_many_as_every_coordinate_needs_and_no_more(ste
     assert half is None or np.any(np.abs(now - half) > SETTLED * np.abs(now).max(axis=0))
 
 
+@pytest.mark.slow
 def test_friction_comes_out_inside_its_intervals() -> None:
     missed = white = 0
     for seed in range(4):
@@ -132,6 +133,7 @@ def test_friction_comes_out_inside_its_intervals() -> None:
     assert white >= 3  # one of 20 tests of white residuals says no
 
 
+@pytest.mark.slow
 def test_what_the_motion_cannot_tell_is_said() -> None:
     """A free swing scales with all masses, inertias and friction: one of them must be kept."""
     free = ["m1", "m2", "I1", "I2", "k1", "k2", "s1", "s2"]

@@ -33,6 +33,7 @@ def inside(found: list[hw.Fit]) -> dict[str, int]:
     return {name: sum(fit[name].low <= TRUE[name] <= fit[name].high for fit in found) for name in TRUE}
 
 
+@pytest.mark.slow
 def test_parameters_and_delay_are_recovered(plant: hw.Plant) -> None:
     found = fits(plant, range(2))
     assert all(fit.success for fit in found)

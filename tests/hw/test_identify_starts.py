@@ -48,6 +48,7 @@ def fitted(log: hw.Log, restart: float = 2.0, **more: object) -> hw.Fit:
     return hw.identify(log, "single_pendulum", list(true), restart=restart, parameters=start, **more)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_default_intervals_are_not_biased_by_the_noise_of_starts() -> None:
     found = [fitted(swing(seed)) for seed in range(5)]
     for name, value in truth().items():

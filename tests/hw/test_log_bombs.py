@@ -96,6 +96,7 @@ def test_there_are_at_least_forty() -> None:
     assert set(QUICK) <= set(BOMBS)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="the peak memory is read from /proc")
 def test_bombs_end_with_an_error_within_memory_and_time(tmp_path: Path) -> None:
     _explode(_available(list(QUICK)), tmp_path)
@@ -130,7 +131,7 @@ def test_messages_full_of_messages_are_refused(message: dict[str, object], refus
     assert bool(_messages.crowded(message)) == refused
 
 
-@pytest.mark.parametrize("many", ["variables", "structs"])
+@pytest.mark.parametrize("many", ["variables", pytest.param("structs", marks=pytest.mark.slow)])
 def test_many_variables_take_their_number_of_steps(many: str, tmp_path: Path) -> None:
     """Four times the variables of a MAT file: four times the calls, not sixteen times."""
     import cProfile

@@ -116,6 +116,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
+@pytest.mark.slow
 def test_ten_million_rows_need_no_more_memory_than_a_hundred_thousand(tmp_path: Path) -> None:
     peaks = []
     for rows in (100_000, 10_000_000):

@@ -33,6 +33,7 @@ def minimal(p, th, w, times):
     return solve_ivp(rhs, (0.0, times[-1]), [*th, *w], method="DOP853", rtol=1e-11, atol=1e-12, t_eval=times).y[:2].T
 
 
+@pytest.mark.slow
 @needs_pendulum
 def test_joints_as_rows_add_nothing_to_minimal_coordinates() -> None:
     log = pendulum("double")

@@ -155,7 +155,7 @@ def test_oblique_slide_in_space():
     np.testing.assert_allclose(found.by_start[:2, 3:5], differences(lambda v: where(v)[:2], v[:2], 1e-4), atol=1e-8)
 
 
-@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (4, 5, 6, 7))])
+@pytest.mark.parametrize("seed", [3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 4, 5, 6, 7))])
 def test_tossed_bodies(seed):
     """Touches with friction, slips that turn, stops, slides out of sticking and releases, in space."""
     scene, q, v, _ = tossed(seed, most=1)

@@ -84,8 +84,8 @@ def test_both_machines_move_tossed_bodies_alike(seed: int) -> None:
 
 @pytest.mark.parametrize(
     ("make", "kinds"),
-    [(tossed, {"cylinder": (0.1, 0.15, 0.0)}), (piled, ("sphere", "box")),
-     *(pytest.param(piled, kinds, marks=pytest.mark.slow) for kinds in SOLIDS)],
+    [(tossed, {"cylinder": (0.1, 0.15, 0.0)}),
+     *(pytest.param(piled, kinds, marks=pytest.mark.slow) for kinds in (("sphere", "box"), *SOLIDS))],
 )  # fmt: skip
 def test_both_machines_move_cans_and_solids_alike(make: Any, kinds: Any) -> None:
     """They share the rows, and neither modes nor events."""

@@ -31,7 +31,7 @@ def _throw(rng, distance, rtol):
     return simulate(flyby(radius, gravity), *start, 1.4 * time, rtol=rtol, atol=1e-2 * rtol, samples=[0.0])
 
 
-@pytest.mark.parametrize("passing", [_swing, _throw])
+@pytest.mark.parametrize("passing", [_swing, pytest.param(_throw, marks=pytest.mark.slow)])
 def test_two_thousand_passes_within_a_nanometre(passing):
     rng = np.random.default_rng(20)
     wrong, done = [], 0

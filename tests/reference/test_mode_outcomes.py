@@ -40,7 +40,7 @@ def drawn(rng: np.random.Generator, ways: int) -> tuple[Any, Any, Any, float, li
 
 @pytest.mark.parametrize("solver", ["compiled", "cvode"])
 @pytest.mark.parametrize("ways", [1, 2])
-@pytest.mark.parametrize("seed", [0, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, *range(4, 40)))])
+@pytest.mark.parametrize("seed", [3, *(pytest.param(k, marks=pytest.mark.slow) for k in (*range(3), *range(4, 40)))])
 def test_a_mode_problem_ends_as_all_its_sets_have_it(seed: int, ways: int, solver: str) -> None:
     """One motion, several, or none because contacts jam: never that no set was found where there is one."""
     rng, ends = np.random.default_rng(seed), set[Outcome]()

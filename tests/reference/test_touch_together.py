@@ -74,7 +74,7 @@ def test_a_symmetric_body_stays_symmetric(rtol: float) -> None:
 
 
 @pytest.mark.parametrize(("engine", "profile"), [("reference", "cvode"), ("reference", "ida"), ("pinocchio", "law")])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3))])
 def test_every_solver_keeps_it(engine: str, profile: str, seed: int) -> None:
     case, legs = squatting(seed)
     exact = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()

@@ -46,7 +46,7 @@ def share_otherwise(monkeypatch: pytest.MonkeyPatch, part: float) -> None:
     monkeypatch.setattr(Balance, "forces", forces)
 
 
-@pytest.mark.parametrize("part", [0.5, -0.5])
+@pytest.mark.parametrize("part", [0.5, pytest.param(-0.5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, 3, 4, 5, 7))])
 def test_another_share_moves_nothing_while_a_motion_is_determined(
     seed: int, part: float, monkeypatch: pytest.MonkeyPatch

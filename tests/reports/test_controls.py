@@ -36,7 +36,10 @@ def blind(case: Case, truth: Truth) -> list[Verdict]:
     return [replace(row, metric=row.metric.removesuffix(" (control)")) for row in rows]
 
 
-@pytest.mark.parametrize(("name", "variant"), LABELS)
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [pytest.param(*label, marks=pytest.mark.slow if label[0] == "soft_contact" else ()) for label in LABELS],
+)
 def test_every_fault_of_a_shipped_case_is_seen(name: str, variant: str) -> None:
     case = cases.load(name, variant)
     assert blind(case, truth_of(case)) == []
@@ -111,7 +114,7 @@ def test_a_blind_metric_makes_the_table_fail(monkeypatch: pytest.MonkeyPatch) ->
     assert verdict.exit_code(row.verdict for row in judged(BALL, [entry], TRUTH, "")) == 1
 
 
-@pytest.mark.parametrize("seed", [0, 2, 6, 14, 17, 25])
+@pytest.mark.parametrize("seed", [0, 6, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 14, 17, 25))])
 def test_no_control_fails_on_random_scenes(seed: int) -> None:
     scene = with_own_laws(random_scene(seed, bodies=1 + seed % 4), seed)
     q, v, _ = random_state(scene, np.random.default_rng(seed))

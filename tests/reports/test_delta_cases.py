@@ -186,6 +186,7 @@ def test_sampled_control_is_the_same_in_every_engine() -> None:
     np.testing.assert_allclose(delta.flanges(robot, run.q[first]), delta.flanges(robot, own.q), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_truth_of_a_chaotic_fall_is_trusted_until_its_sources_part() -> None:
     from crossbody.reports.judging.truth import truth_of
 

@@ -339,6 +339,7 @@ def test_compiled_code_that_never_comes_back_is_ended_and_the_rest_goes_on(tmp_p
     assert not (rows.loc[["exact"], "verdict"] == "outside").any()
 
 
+@pytest.mark.slow
 def test_an_identification_that_never_comes_back_is_ended(tmp_path: Path) -> None:
     log = run_as_log(cases.load("bouncing_ball", "linear", t_end=0.5), {"height": 0}, 1e-4)
     hw.store(log, tmp_path / "log.parquet")
@@ -420,6 +421,7 @@ def test_a_child_that_has_ended_already_is_not_told_to(monkeypatch: pytest.Monke
     assert one.signalled == signal.SIGINT
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_enough_is_no_fault_and_the_work_is_done(tmp_path: Path) -> None:
     """Of every command: nobody reads a word of it, and it ends as it would, with all that it has to write."""
     (tmp_path / "arm.xml").write_text(ARM)

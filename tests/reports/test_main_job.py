@@ -21,6 +21,7 @@ def result(variant: str) -> jobs.CaseResult:
     return jobs.run_case(cases.load(CASE, variant), choice.picks(()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", cases.variants(CASE))
 def test_no_engine_is_outside(variant: str) -> None:
     """Also of known deviations, whose stored sizes follow from what numbers are measured by."""

@@ -457,6 +457,7 @@ def fake_rows(count: int, name: str = "case {}") -> list[Row]:
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_thousand_cases_are_paged(tmp_path: Path) -> None:
     out = made(tmp_path / "out", [], fake_rows(1000))
     assert len(list(out.glob("index*.html"))) == 10

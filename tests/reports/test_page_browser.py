@@ -384,7 +384,7 @@ def test_one_file_shows_one_page_at_a_time(out: Path, browser: chromium.Browser)
 AXE = find_spec("axe_playwright_python")
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("theme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_every_page_is_quiet_fits_and_has_no_violation(whole: Path, browser: chromium.Browser, theme: str) -> None:
     names = sorted(path.name for path in whole.glob("*.html"))
     assert {INDEX, CASE, *(f"{name}.html" for name in sections.names() if name not in MEASURED)} <= set(names)
