@@ -38,7 +38,7 @@ OF_FRICTION = (
     "state", "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among",
     "seen", "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated",
     "turn_by", "bent", "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
-    "borne", "even", "known", "off_by", "course",
+    "borne", "even", "carried", "known", "off_by", "course",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -394,6 +394,7 @@ class Work:
     pushed: Floats  # (nc,) right-hand sides less what forces of rows do that slide with a bound of their own
     loop: Index  # places of rows of loops,
     closing: Floats2  # the factor L of G = L L^T of these,
+    carried: Floats  # (nc,) what loops ask of a tangential row that they hold,
     led: Floats2  # L^-1 G of these and all others, by columns,
     drawn: Floats  # and L^-1 of their right-hand sides
 

@@ -134,7 +134,10 @@ def _led(s: Any, w: Work, c: int) -> float:
 
 @compiled
 def _hold(s: Any, m: Model, w: Work) -> int:
-    """Put zeros for rows that loops hold; 1 if one of a contact should rise all the same."""
+    """Put zeros for rows that loops hold; 1 if one of a contact should rise all the same.
+
+    What a tangential one is asked for beyond rounding stays in w.carried: loops move it on, so that it cannot stick.
+    """
     gap, rate = 0.0, 0.0
     for a in range(s.nq + s.n):
         known = KNOWN * (w.atol[a] + s.rtol * abs(w.y[a]))
@@ -145,6 +148,8 @@ def _hold(s: Any, m: Model, w: Work) -> int:
         if not is_loop(m, i) and not w.gram[c, c] > DEPENDENT * _led(s, w, c):
             most = max(HELD, s.rtol) * w.scale[c] + w.law[i, 0] * gap + w.law[i, 1] * rate
             code |= not is_tangent(m, i) and w.r[c] > most
+            asked = w.r[c] + w.law[i, 1] * w.hda[c]
+            w.carried[c] = asked if is_tangent(m, i) and abs(asked) > most else 0.0
             w.r[c] = 0.0
             for d in range(s.na):
                 w.gram[c, d], w.gram[d, c] = 0.0, 0.0

@@ -27,6 +27,7 @@ from crossbody.reference.core.mode_set import (
     ahead,
     apart,
     aside,
+    carried_on,
     evaluate_set,
     face_against,
     first_row,
@@ -70,7 +71,7 @@ def _worst(s: Any, m: Model, w: Work) -> int:
             other, then = -1.0, STICK
             if w.state[i] == STICK:
                 other, then = (size_along(m, w, i, w.la) - bound(m, i, max(w.la[j], 0.0))) * w.gram[j, j], SLIP
-                other = max(other, off_stick(s, m, w, i)) if s.strict else other
+                other = max(other, carried_on(s, m, w, i), off_stick(s, m, w, i) if s.strict else 0.0)
             elif w.stands[i]:
                 other = max(-ahead(m, w, i), abs(aside(m, w, i)))
             if other > missing:

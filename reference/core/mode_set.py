@@ -38,7 +38,7 @@ def look(s: Any, m: Model, w: Work) -> None:
         tangential = m.follows[i] >= 0 and has_friction(m, m.follows[i])
         w.bare[j] = w.r[j] + (w.law[i, 1] * w.hda[j] if tangential else 0.0)
         if s.loops and (is_loop(m, i) or is_idle(w, j)):
-            w.bare[j] = 0.0
+            w.bare[j] = w.carried[j] if tangential else 0.0
         else:
             s.push_scale = max(s.push_scale, w.scale[j])
     for j in range(s.na):
@@ -162,6 +162,15 @@ def face_against(m: Model, w: Work, i: int, x: Array) -> bool:
 def off_stick(s: Any, m: Model, w: Work, i: int) -> float:
     """By how much faster than its law contact i moves, which sticks: it may contradict others that do."""
     return size_along(m, w, i, w.excess) if s.dependent_rows > 0 else 0.0
+
+
+@compiled
+def carried_on(s: Any, m: Model, w: Work, i: int) -> float:
+    """By how much loops accelerate contact i along its surface where nothing can hold it."""
+    most = 0.0
+    for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i] if s.loops else 0):
+        most = max(most, abs(w.bare[c]) if is_idle(w, c) else 0.0)
+    return float(most)
 
 
 @compiled

@@ -41,7 +41,7 @@ from crossbody.reference.core.slips import face, note_speed
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 AT_BOUND = 2.0 * (1.0 - INSIDE)  # part of its bound below it at which a contact has reached it, where loads are shared
 ITSELF, BESIDE = 1, 2  # has reached its bound; with one that has
-SLIGHT = 1e-4  # part of the largest acceleration by which sticks may contradict each other
+SLIGHT = 1e-8  # part of the largest acceleration by which sticks may contradict each other
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 
 

@@ -24,7 +24,7 @@ from crossbody.reference.sundials.sliding import Seen, Sliding
 AGREES = 1e-10  # part of the largest acceleration by which a set of modes may be off
 SWEEPS = 3000
 MOST_SETS = 4096
-SLIGHTLY = 1e-4  # part of the largest acceleration by which contacts that stick may contradict each other
+SLIGHTLY = 1e-8  # part of the largest acceleration by which contacts that stick may contradict each other
 STAYS = 1e-7  # part of the largest acceleration, below which what begins to slide goes nowhere
 JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
 CLEAR = 1e-5  # likewise, of what goes on where others have come to a jam
@@ -212,7 +212,8 @@ class ModeProblem:
                     force = float(np.linalg.norm(tried.lam[ways]))
                     bound = max(self.sliding.bound(self.seen, tried.lam, i), 0.0)
                     off.append(((force - bound) * heavy, Mode.SLIP))
-                    moved = self._off_stick(tried, i) if i in self.sliding.dry or self._strict else 0.0
+                    strict = i in self.sliding.dry or self._strict or not self.seen.G[ways, ways].all()
+                    moved = self._off_stick(tried, i) if strict else 0.0
                     off.append((moved if moved > OTHERWISE * self.scale else 0.0, Mode.SLIP))  # by rows it depends on
                 elif mode == Mode.SLIP and i in self.stands:
                     off.append((-float(tried.ways[i] @ tried.excess[ways]), Mode.STICK))
@@ -310,7 +311,7 @@ class ModeProblem:
                 along, bound = self._along(i), self.sliding.bound(seen, lam, i)
                 if i in fixed:
                     lam[along] = -bound * fixed[i]
-                elif along:
+                elif along and own[along].any():
                     step = lam[along] + (seen.bare[along] - seen.G[along] @ lam) / own[along].max()
                     size = float(np.linalg.norm(step))
                     lam[along] = step * (bound / size) if size > bound else step

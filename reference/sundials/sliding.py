@@ -165,6 +165,8 @@ class Sliding:
     def _leave_held(self, M: Floats, H: Floats, G: Floats, bare: Floats, least: Floats, rows: list[int]) -> None:
         """Put zeros for rows that loops hold, so that nothing moves them but rounding: they bear nothing.
 
+        A tangential one keeps what it is asked for beyond `least`: loops move it on, so that it cannot stick.
+
         Raises:
             Ended: ILL_POSED for a contact that should rise by more than `least` (b, m): no push can make it.
         """
@@ -173,7 +175,9 @@ class Sliding:
         for b, k in np.argwhere(idle).tolist():
             if rows[k] not in self.normal and bare[b, k] > least[b, k]:
                 raise Ended(Outcome.ILL_POSED, [rows[k]])
-            G[b, k], G[b, :, k], bare[b, k] = 0.0, 0.0, 0.0
+            G[b, k], G[b, :, k] = 0.0, 0.0
+            if rows[k] not in self.normal or abs(bare[b, k]) <= least[b, k]:
+                bare[b, k] = 0.0
 
     def bound(self, seen: Seen, lam: Floats, i: int) -> float:
         """The most that friction of contact i can be under the multipliers lam (m,), N."""
