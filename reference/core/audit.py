@@ -60,7 +60,7 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
     for j in range(s.na if s.contradiction > 0.0 else 0):  # what rows that depend on each other leave of their laws
         open_by += s.contradiction * w.allowed[j]
     for j in range(s.na):
-        if s.frictional and (is_shared(s, m, w, w.idx[j]) or (s.loops and bears_nothing(m, w, j))):
+        if s.frictional and (is_shared(s, m, w, w.idx[j]) or bears_nothing(m, w, j)):
             continue  # or loops hold it, as its elimination has checked
         missing, rounding = _residual(s, m, w, b.mode, j, stage)
         if missing <= CLOSE * w.scale[j] + rounding + open_by:

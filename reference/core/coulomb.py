@@ -12,7 +12,7 @@ from crossbody.reference.core.directions import take_directions
 from crossbody.reference.core.friction import has_friction, is_dry
 from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.core.loads import factor_in_turn, refine, solve_in_turn, spread
-from crossbody.reference.core.loops import eliminate
+from crossbody.reference.core.loops import eliminate, leave_unmoved
 from crossbody.reference.core.unknowns import fill, list_unknowns
 from crossbody.reference.kinds import Array
 
@@ -42,6 +42,7 @@ def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
             w.gram[c, j] = value
     if s.loops and eliminate(s, m, w) != 0:
         return 1
+    leave_unmoved(s, m, w)
     take_directions(s, m, w, turning)
     factor_as_held(s, m, w)
     return int(s.rank == 0 and s.unknowns > 0)

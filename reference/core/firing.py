@@ -24,6 +24,7 @@ from crossbody.reference.core.layout import (
     Work,
 )
 from crossbody.reference.core.machine import active_mode
+from crossbody.reference.core.mode_set import CLEAR_OF_A_JAM
 from crossbody.reference.kernels import LOST as IS_LOST
 
 JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
@@ -79,8 +80,8 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Let contacts that begin to slide do so against what held them; whether some have jammed.
 
-    One that lets go where it pulls has jammed if its force has changed its sign through infinity. Leaves in s.jumps
-    whether loads jump: not where a force reaches its bound or vanishes.
+    Before a jam forces grow without bound: they take others to their bounds, or off, less than a step can resolve
+    before it, and what has passed it pulls. Leaves in s.jumps whether loads jump: not where a force reaches its bound or vanishes.
     """
     slips, jam, released, s.jumps = False, False, False, 0
     for i in range(s.nc):
@@ -88,12 +89,13 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
             s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
             jam = jam or (w.kind[i] == guards.JAM and not events.stops(s, m, w, i))
             slips = slips or w.kind[i] == guards.CONE
-            released = released or (w.kind[i] == guards.RELEASE and b.mode[i] == SLIP)
+            released = released or (w.kind[i] == guards.RELEASE and m.tangents[i] > 0)
     nq, known = s.nq, slips or released
     if known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
         scatter(s, w, w.lam0)
-        pulls = events.pulling(s, m, w, b.mode) if released else -1
-        jam = jam or (pulls >= 0 and w.kind[pulls] == guards.RELEASE and ask(DETERMINANT, s, m, w, pulls) <= 0.0)
+        for i in range(s.nc):
+            if b.mode[i] == SLIP and has_friction(m, i) and not is_dry(m, i) and not jam:
+                jam = ask(DETERMINANT, s, m, w, i) <= CLEAR_OF_A_JAM
         if slips:
             ask(BEGIN_SLIP, s, m, w, NOTHING)
     return jam

@@ -394,7 +394,7 @@ class Work:
     pushed: Floats  # (nc,) right-hand sides less what forces of rows do that slide with a bound of their own
     loop: Index  # places of rows of loops,
     closing: Floats2  # the factor L of G = L L^T of these,
-    carried: Floats  # (nc,) what loops ask of a tangential row that they hold,
+    carried: Floats  # (nc,) what a tangential row is asked for that nothing can hold
     led: Floats2  # L^-1 G of these and all others, by columns,
     drawn: Floats  # and L^-1 of their right-hand sides
 

@@ -17,11 +17,12 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import DEPENDENT, RANK
-from crossbody.reference.core.friction import is_tangent
+from crossbody.reference.core.friction import is_dry, is_tangent
 from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.kinds import Array
 
 HELD = 1e-9  # part of its terms by which a row that loops hold may be asked to move, and at least rtol
+UNMOVED = 1e-14  # part of its terms by which a row's friction must accelerate it to count
 KNOWN = 100.0  # times what the tolerance makes of a gap and its rate: loops may have drifted by so much
 
 
@@ -34,7 +35,7 @@ def is_loop(m: Model, i: int) -> bool:
 
 @compiled
 def is_idle(w: Work, j: int) -> bool:
-    """Whether loops hold the row in place j, so that no contact moves it."""
+    """Whether loops hold the row in place j, so that no contact moves it, or its friction moves nothing."""
     return not w.gram[j, j] > 0.0
 
 
@@ -134,10 +135,7 @@ def _led(s: Any, w: Work, c: int) -> float:
 
 @compiled
 def _hold(s: Any, m: Model, w: Work) -> int:
-    """Put zeros for rows that loops hold; 1 if one of a contact should rise all the same.
-
-    What a tangential one is asked for beyond rounding stays in w.carried: loops move it on, so that it cannot stick.
-    """
+    """Put zeros for rows that loops hold; 1 if one of a contact should rise all the same."""
     gap, rate = 0.0, 0.0
     for a in range(s.nq + s.n):
         known = KNOWN * (w.atol[a] + s.rtol * abs(w.y[a]))
@@ -148,12 +146,29 @@ def _hold(s: Any, m: Model, w: Work) -> int:
         if not is_loop(m, i) and not w.gram[c, c] > DEPENDENT * _led(s, w, c):
             most = max(HELD, s.rtol) * w.scale[c] + w.law[i, 0] * gap + w.law[i, 1] * rate
             code |= not is_tangent(m, i) and w.r[c] > most
-            asked = w.r[c] + w.law[i, 1] * w.hda[c]
-            w.carried[c] = asked if is_tangent(m, i) and abs(asked) > most else 0.0
-            w.r[c] = 0.0
-            for d in range(s.na):
-                w.gram[c, d], w.gram[d, c] = 0.0, 0.0
+            _put_zeros(s, m, w, c, most)
     return int(code)
+
+
+@compiled
+def _put_zeros(s: Any, m: Model, w: Work, c: int, most: float) -> None:
+    """Take the row in place c out; what a tangential one is asked for beyond `most` stays in w.carried."""
+    i = w.idx[c]
+    asked = w.r[c] + w.law[i, 1] * w.hda[c]
+    w.carried[c] = asked if is_tangent(m, i) and abs(asked) > most else 0.0
+    w.r[c] = 0.0
+    for d in range(s.na):
+        w.gram[c, d], w.gram[d, c] = 0.0, 0.0
+
+
+@compiled
+def leave_unmoved(s: Any, m: Model, w: Work) -> None:
+    """Take out rows that their whole dry friction moves by rounding alone, as that of a tendon where it is shortest."""
+    for c in range(s.na):
+        i = w.idx[c]
+        unmoved = is_dry(m, i) and m.friction[i] * w.gram[c, c] <= UNMOVED * w.scale[c]
+        if unmoved and not (s.loops and is_idle(w, c)):
+            _put_zeros(s, m, w, c, HELD * w.scale[c])
 
 
 @compiled

@@ -37,7 +37,7 @@ def look(s: Any, m: Model, w: Work) -> None:
         i = w.idx[j]
         tangential = m.follows[i] >= 0 and has_friction(m, m.follows[i])
         w.bare[j] = w.r[j] + (w.law[i, 1] * w.hda[j] if tangential else 0.0)
-        if s.loops and (is_loop(m, i) or is_idle(w, j)):
+        if is_idle(w, j) or (s.loops and is_loop(m, i)):
             w.bare[j] = w.carried[j] if tangential else 0.0
         else:
             s.push_scale = max(s.push_scale, w.scale[j])
@@ -166,9 +166,9 @@ def off_stick(s: Any, m: Model, w: Work, i: int) -> float:
 
 @compiled
 def carried_on(s: Any, m: Model, w: Work, i: int) -> float:
-    """By how much loops accelerate contact i along its surface where nothing can hold it."""
+    """By how much contact i is accelerated along its surface where nothing can hold it."""
     most = 0.0
-    for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i] if s.loops else 0):
+    for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
         most = max(most, abs(w.bare[c]) if is_idle(w, c) else 0.0)
     return float(most)
 

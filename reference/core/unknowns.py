@@ -40,7 +40,7 @@ def list_unknowns(s: Any, m: Model, w: Work) -> int:
     normals = count
     for j in range(s.na):
         i = w.idx[j]
-        if not w.off[i] and is_tangent(m, i) and not w.slides[i] and not (s.loops and bears_nothing(m, w, j)):
+        if not w.off[i] and is_tangent(m, i) and not w.slides[i] and not bears_nothing(m, w, j):
             w.unknown[count] = j
             count += 1
     s.unknowns = count

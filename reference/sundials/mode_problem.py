@@ -24,7 +24,7 @@ from crossbody.reference.sundials.sliding import Seen, Sliding
 AGREES = 1e-10  # part of the largest acceleration by which a set of modes may be off
 SWEEPS = 3000
 MOST_SETS = 4096
-SLIGHTLY = 1e-8  # part of the largest acceleration by which contacts that stick may contradict each other
+
 STAYS = 1e-7  # part of the largest acceleration, below which what begins to slide goes nowhere
 JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
 CLEAR = 1e-5  # likewise, of what goes on where others have come to a jam
@@ -79,7 +79,7 @@ class ModeProblem:
         modes = {**self.modes, **dict.fromkeys(self.begins, Mode.SLIP)}
         ways = {**self.slides, **self.begins}
         found = self._pivoted(modes, ways) or self._swept(modes, ways) or self._searched(modes)
-        if found is not None and self._strays(found) > SLIGHTLY * self.scale:
+        if found is not None and self._strays(found) > self.limit:
             self._strict = True
             met = self._pivoted(modes, ways) or self._swept(modes, ways)
             found, self._strict = met or found, met is not None

@@ -10,6 +10,8 @@ from mode_enumeration import Contact, enumerated
 
 from crossbody import cases
 from crossbody.cases import Mode, Outcome
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.reference import simulate
 from crossbody.reference.sundials.equations import Equations
 from crossbody.reference.sundials.sliding import Sliding
@@ -22,6 +24,7 @@ LADDER = """<mujoco><option cone="elliptic"/><worldbody>
     <geom name="rod" type="capsule" size=".05 .7" mass="1" friction=".3 0 0"/></body>
 </worldbody></mujoco>"""
 """A rod slides down a wall, and up again while its foot sticks, as its top still returns to its law."""
+RTOL, MOVES = 1e-9, 200.0
 TURNS, FOOT, TOP = 0.1442766, 0, 3  # s, at which the slip of its top passes zero; rows
 
 
@@ -52,3 +55,43 @@ def test_the_top_of_a_ladder_turns_round_without_a_stop(ladder: cases.Case, solv
     assert not [e for e in found.events if e.t > TURNS - 1e-3 and e.before != e.after]
     assert found.unique_until == np.inf
     assert (int(found.mode[-1, FOOT]), int(found.mode[-1, TOP])) == (Mode.STICK, Mode.SLIP)
+
+
+def cornered(seed: int) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """Draw a box that moves in the plane and falls into the corner of a floor and a wall."""
+    rng = np.random.default_rng([seed, 41])
+    law = RowLaw(a0=10.0 ** rng.uniform(3, 5), a1=10.0 ** rng.uniform(0.7, 2.6))
+    angle, (long, high) = rng.uniform(0.1, 1.4), (0.15, 0.1)
+    upright = (float(np.cos(np.pi / 4)), 0.0, float(np.sin(np.pi / 4)), 0.0)
+    shapes = (
+        Shape(name="floor", type="plane"), Shape(name="wall", type="plane", orientation=upright),
+        Shape(name="box", body="box", type="box", size=(long, 0.12, high)),
+    )  # fmt: skip
+    pairs = tuple(
+        Pair(name=name, first=name, second="box", friction=(mu, mu, 0, 0, 0), dimension=3, law=law)
+        for name, mu in zip(("floor", "wall"), rng.uniform(0.2, 1.5, size=2).tolist(), strict=True)
+    )
+    joints = (
+        Joint(name="x", body="box", type="slide", axis=(1, 0, 0)), Joint(name="z", body="box", type="slide"),
+        Joint(name="turn", body="box", type="hinge", axis=(0, 1, 0)),
+    )  # fmt: skip
+    scene = Scene(
+        bodies=(Body(name="box", mass=1.0, inertia=(0.008, 0.01, 0.012, 0, 0, 0)),), joints=joints, shapes=shapes,
+        pairs=pairs,
+    )  # fmt: skip
+    wide, tall = long * np.cos(angle) + high * np.sin(angle), long * np.sin(angle) + high * np.cos(angle)
+    return scene, np.array([wide + 0.01, tall + 0.01, angle]), rng.normal(size=3) * rng.choice([0.0, 0.5, 2.0])
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_what_sticks_does_not_move(seed: int) -> None:
+    """Nor does it where a box comes to rest between a floor and a wall, and its feet contradict each other slightly."""
+    scene, q, v = cornered(seed)
+    made = system(scene, case_of(scene).law, q)
+    found = simulate(made, q, v, 0.4, rtol=RTOL, samples=np.linspace(0.0, 0.4, 400))
+    assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
+    rates = np.array([made.gap(*state)[1] for state in zip(found.q, found.v, strict=True)])
+    for row, own in enumerate(np.asarray(made.follows).tolist()):
+        if own >= 0 and own != row:
+            sticks = found.mode[:, own] == Mode.STICK
+            assert np.abs(rates[sticks, row]).max(initial=0.0) <= MOVES * RTOL * max(1.0, np.abs(found.v).max())
