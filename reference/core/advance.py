@@ -10,6 +10,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core import (
     audit,
     choice,
+    cones,
     dense,
     dop853,
     events,
@@ -33,6 +34,7 @@ from crossbody.reference.core.layout import (
     EXPLICIT,
     ILL_POSED,
     IMPLICIT,
+    INCONSISTENT,
     LOST,
     MODE_CYCLE,
     MORE,
@@ -178,6 +180,16 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @compiled
+def _sticks_too_hard(s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Whether a contact sticks by more than its bound though nothing has fired; it marks that."""
+    i, marks = cones.beyond_bound(s, m, w), b.history[len(b.history) - 1]
+    if i >= 0:
+        marks[:] = 0
+        marks[i] = 1
+    return bool(i >= 0)
+
+
+@compiled
 def _stuck(K: Any, s: Any, m: Model, w: Work, b: Buffers, code: int) -> int:
     """Why time does not go on: contacts are about to jam, or what a step found."""
     return int(PAINLEVE if s.frictional and instant.ask(instant.JAM, K, s, m, w, b) != 0 else code)
@@ -224,6 +236,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         _remember_step(s, before)
         _move(s, w, t)
         return _switch(K, s, m, w, b)
+    if s.frictional and _sticks_too_hard(s, m, w, b):
+        return INCONSISTENT
     _take_over(s, w)
     _move(s, w, t)
     _remember_step(s, before)

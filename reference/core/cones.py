@@ -14,6 +14,8 @@ from crossbody.reference.core.friction import bound, has_friction, is_tangent, m
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
+UNKNOWN = 1e3  # times what modes are decided to, by which a force may be off at a step's end
+
 
 @compiled
 def without_pull(s: Any, m: Model, w: Work) -> None:
@@ -69,3 +71,20 @@ def margin(s: Any, m: Model, w: Work, i: int) -> float:
     """How far contact i is from what ends its sticking as it does: its bound, or that rows depend on each other."""
     until_apart = bound(m, i, w.la[w.listed[i]]) * (1.0 - s.growth)
     return float(min(within_bound(m, w, i), until_apart) if s.growth > 0.0 else within_bound(m, w, i))
+
+
+@compiled
+def beyond_bound(s: Any, m: Model, w: Work) -> int:
+    """Return the contact that sticks at the step's end by far more than its bound, -1 if none does.
+
+    No event has ended that: its rows became others' on the way, or a guard was lost. Shared loads are left to theirs.
+    """
+    lam = w.lams[NODES - 1]
+    for j in range(s.na if s.dependent_rows == 0 else 0):
+        i = w.idx[j]
+        if has_friction(m, i) and not w.slides[i] and w.gram[j, j] > 0.0:
+            pull = m.alpha[m.tangent[i], 1] * most_drift(s) / w.gram[j, j]
+            most = bound(m, i, max(lam[i], 0.0)) + pull + UNKNOWN * w.tolerated[i]
+            if _within_bound(m, i, lam, i, m.tangent[i]) < -most:
+                return int(i)
+    return -1

@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import events, guards, journal, settle
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, scatter
-from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, DIES_INTO_JAM, NOTHING, ask, has_friction, is_dry
+from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, NOTHING, WAY_TO_REST, ask, has_friction, is_dry
 from crossbody.reference.core.layout import (
     BALLISTIC,
     FREE,
@@ -24,7 +24,7 @@ from crossbody.reference.core.layout import (
     Work,
 )
 from crossbody.reference.core.machine import active_mode
-from crossbody.reference.core.mode_set import CLEAR_OF_A_JAM
+from crossbody.reference.core.stops import JAMS, STOPS
 from crossbody.reference.kernels import LOST as IS_LOST
 
 JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
@@ -38,10 +38,10 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
     if s.frictional and s.standing > STANDSTILL + s.nc:  # ever sooner before a jam: what goes on is clear of it
         s.jam = s.jam or jams(K, s, m, w, b)
-    if s.frictional and _stops_in_a_jam(K, s, m, w, b):
-        if _presses_alone(s, m, w, b):
-            return PAINLEVE
-        s.jam = True  # others may go on without it, and no law says which
+    meets = _way_to_rest(K, s, m, w, b) if s.frictional else STOPS
+    if meets == JAMS and _presses_alone(s, m, w, b):
+        return PAINLEVE
+    s.jam = s.jam or meets == JAMS  # others may go on without it, and no law says which
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
@@ -80,8 +80,8 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Let contacts that begin to slide do so against what held them; whether some have jammed.
 
-    Before a jam forces grow without bound: they take others to their bounds, or off, less than a step can resolve
-    before it, and what has passed it pulls. Leaves in s.jumps whether loads jump: not where a force reaches its bound or vanishes.
+    One that lets go where it pulls has jammed if its force has changed its sign through infinity. Leaves in s.jumps
+    whether loads jump: not where a force reaches its bound or vanishes.
     """
     slips, jam, released, s.jumps = False, False, False, 0
     for i in range(s.nc):
@@ -89,33 +89,32 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
             s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
             jam = jam or (w.kind[i] == guards.JAM and not events.stops(s, m, w, i))
             slips = slips or w.kind[i] == guards.CONE
-            released = released or (w.kind[i] == guards.RELEASE and m.tangents[i] > 0)
+            released = released or (w.kind[i] == guards.RELEASE and b.mode[i] == SLIP)
     nq, known = s.nq, slips or released
     if known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) == 0:
         scatter(s, w, w.lam0)
-        for i in range(s.nc):
-            if b.mode[i] == SLIP and has_friction(m, i) and not is_dry(m, i) and not jam:
-                jam = ask(DETERMINANT, s, m, w, i) <= CLEAR_OF_A_JAM
+        pulls = events.pulling(s, m, w, b.mode) if released else -1
+        jam = jam or (pulls >= 0 and w.kind[pulls] == guards.RELEASE and ask(DETERMINANT, s, m, w, pulls) <= 0.0)
         if slips:
             ask(BEGIN_SLIP, s, m, w, NOTHING)
     return jam
 
 
 @compiled
-def _stops_in_a_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Whether a contact whose slip comes to its end jams first, too slow for any step to see; it marks this one."""
+def _way_to_rest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """What a contact whose slip comes to its end meets first, too slow for any step to see; it marks one that jams."""
     nq, known, marks = s.nq, False, b.history[len(b.history) - 1]
     for i in range(s.nc):
         if not (w.hit[i] <= s.theta and m.tangents[i] > 1 and events.stops(s, m, w, i)):
             continue
         if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) != 0:
-            return False
+            return int(STOPS)
         known = True
-        if ask(DIES_INTO_JAM, s, m, w, i) > 0.0:
+        if ask(WAY_TO_REST, s, m, w, i) == JAMS:
             marks[:] = 0
             marks[i] = 1
-            return True
-    return False
+            return int(JAMS)
+    return int(STOPS)
 
 
 @compiled

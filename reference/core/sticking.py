@@ -41,6 +41,7 @@ from crossbody.reference.core.slips import face, note_speed
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
 AT_BOUND = 2.0 * (1.0 - INSIDE)  # part of its bound below it at which a contact has reached it, where loads are shared
 ITSELF, BESIDE = 1, 2  # has reached its bound; with one that has
+SLIGHT = 1e-6  # part of the largest acceleration by which sticks may contradict each other
 IDLE = 1e-7  # part of the largest acceleration below which one that begins to slide goes nowhere
 
 
@@ -133,7 +134,7 @@ def _meet_all(s: Any, m: Model, w: Work) -> None:
         i = w.idx[j]
         if has_friction(m, i) and w.state[i] == STICK:
             most = max(most, off_stick(s, m, w, i))
-    if most <= decided_to(s):
+    if most <= SLIGHT * s.push_scale:
         return
     s.strict = 1
     if not _reached(s, m, w):

@@ -1,4 +1,4 @@
-"""Whether a slip that dies out jams before it stops: how slow it is makes no difference to where it turns."""
+"""What a slip that dies out meets before it stops: how slow it is makes no difference to where it turns."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core.cones import within_bound
 from crossbody.reference.core.coulomb import factor_as_held, respond
-from crossbody.reference.core.friction import has_begun, has_friction, is_dry, slip, small_slip
-from crossbody.reference.core.guards import at_node
+from crossbody.reference.core.friction import decided_to, has_begun, has_friction, is_dry, slip, small_slip
+from crossbody.reference.core.guards import RELEASE, at_node
 from crossbody.reference.core.jams import determinant
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.core.mode_set import aside, exceed
 from crossbody.reference.core.slips import CLEAR, angle
 
+STOPS, JAMS, LETS_GO = np.arange(3)
 PARTS, HALVINGS = 48, 40  # of a full turn that are looked at, and between two of these
 
 
@@ -39,15 +41,38 @@ def _distance(s: Any, m: Model, w: Work, i: int, at: float) -> float:
 
 
 @compiled
-def _across(s: Any, m: Model, w: Work, i: int) -> float:
-    """How fast the slip of contact i is accelerated across the direction for which rows were last factored.
-
-    It is 0 where a contact would pull: it lets go on the way, and what follows is another set's.
-    """
-    respond(s, m, w, w.pushed, w.la)
+def _pulling(s: Any, m: Model, w: Work) -> int:
+    """The contact that pulls most under w.la, -1 if none does."""
+    found, most = -1, decided_to(s)
     for j in range(s.na):
-        if m.unilateral[w.idx[j]] and m.follows[w.idx[j]] < 0 and w.la[j] < 0.0:
-            return 0.0
+        i = w.idx[j]
+        pull = -w.la[j] * w.gram[j, j]
+        if m.unilateral[i] and m.follows[i] < 0 and pull > most:
+            found, most = int(i), pull
+    return found
+
+
+@compiled
+def _breaks_away(s: Any, m: Model, w: Work) -> bool:
+    """Whether a contact that sticks would bear more than its bound under w.la."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if has_friction(m, i) and not w.slides[i] and within_bound(m, w, i) * w.gram[j, j] < -decided_to(s):
+            return True
+    return False
+
+
+@compiled
+def _across(s: Any, m: Model, w: Work, i: int, at: float) -> float:
+    """How fast the slip of contact i is accelerated across the angle `at` along which it slides.
+
+    It is not a number where the contact jams, or another one would pull or break away: what follows is another set's.
+    """
+    if _distance(s, m, w, i, at) <= 0.0:
+        return np.nan
+    respond(s, m, w, w.pushed, w.la)
+    if _pulling(s, m, w) >= 0 or _breaks_away(s, m, w):
+        return np.nan
     exceed(s, w, w.pushed, w.la)
     return float(aside(m, w, i))
 
@@ -63,50 +88,71 @@ def _may_jam(s: Any, m: Model, w: Work, i: int) -> bool:
 
 
 @compiled
-def _turns_into_jam(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether the slip of contact i turns into a direction in which it jams before it comes to one that it keeps.
+def _way_to_rest(s: Any, m: Model, w: Work, i: int) -> int:
+    """What the slip of contact i meets while it turns into a direction that it keeps: STOPS, JAMS or LETS_GO.
+
+    Another contact that lets go on the way does so here.
 
     Near zero it obeys z' = a(z / |z|), all else as it stands: its direction follows the part of a across it, at a rate
     that goes as 1/|z|, and the way that it takes is the same however small it is.
     """
     low = _last_clear(s, m, w, i)
-    if _distance(s, m, w, i, low) <= 0.0:
-        return False  # the step has not come this way
-    across = _across(s, m, w, i)
+    across = _across(s, m, w, i, low)
+    if np.isnan(across):
+        return int(STOPS)  # the step has not come this way
     turn = np.copysign(2.0 * np.pi / PARTS, across)
     for _ in range(PARTS):
         high = low + turn
-        distance = _distance(s, m, w, i, high)
-        if distance > 0.0:
-            if _across(s, m, w, i) * across <= 0.0:
-                return False
-            low = high
-            continue
-        for _ in range(HALVINGS):
+        now = _across(s, m, w, i, high)
+        barred = np.isnan(now)
+        for _ in range(HALVINGS if barred else 0):
             middle = 0.5 * (low + high)
-            if _distance(s, m, w, i, middle) <= 0.0:
+            now = _across(s, m, w, i, middle)
+            if np.isnan(now):
                 high = middle
-            elif _across(s, m, w, i) * across <= 0.0:
-                return False
+            elif now * across <= 0.0:
+                return int(STOPS)
             else:
                 low = middle
-        return True
-    return False
+        if barred:
+            if _distance(s, m, w, i, high) <= 0.0:
+                return int(JAMS)
+            respond(s, m, w, w.pushed, w.la)
+            k = _pulling(s, m, w)
+            if k >= 0 and not _breaks_away(s, m, w):
+                w.hit[k], w.kind[k] = s.theta, RELEASE
+                return int(LETS_GO)
+            return int(STOPS)
+        if now * across <= 0.0:
+            return int(STOPS)
+        low = high
+    return int(STOPS)
 
 
 @compiled
-def dies_into_jam(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether contact i, whose slip dies out at the present instant as evaluated, jams before it is at rest."""
+def _several_press(s: Any, m: Model, w: Work) -> bool:
+    """Whether more than one contact presses, of which another may let go."""
+    pressing = 0
+    for j in range(s.na):
+        pressing += m.unilateral[w.idx[j]] and m.follows[w.idx[j]] < 0
+    return bool(pressing > 1)
+
+
+@compiled
+def way_to_rest(s: Any, m: Model, w: Work, i: int) -> int:
+    """What contact i, whose slip dies out at the present instant as evaluated, meets before it is at rest."""
     if is_dry(m, i) or m.tangents[i] == 1 or has_begun(w, i) or not w.slides[i]:
-        return False
+        return int(STOPS)
     for j in range(s.na):
         k = w.idx[j]
         slides = has_friction(m, k) and w.slides[k] and not is_dry(m, k)
         if k != i and slides and slip(m, w, k, w.rate) <= small_slip(s):
-            return False  # several turn together
+            return int(STOPS)  # several turn together
     c = w.listed[m.tangent[i]]
     x, y = w.along[c], w.along[c + 1]
-    jams = _may_jam(s, m, w, i) and _turns_into_jam(s, m, w, i)
+    meets = STOPS
+    if _several_press(s, m, w) or _may_jam(s, m, w, i):
+        meets = _way_to_rest(s, m, w, i)
     w.along[c], w.along[c + 1] = x, y
     factor_as_held(s, m, w)
-    return bool(jams)
+    return int(meets)

@@ -22,9 +22,9 @@ from crossbody.reference.sundials.equations import ULP
 from crossbody.reference.sundials.sliding import Seen, Sliding
 
 AGREES = 1e-10  # part of the largest acceleration by which a set of modes may be off
+NOTHING = 1e-6  # part of what dry friction may accelerate a row by, below which nothing drives it
 SWEEPS = 3000
 MOST_SETS = 4096
-
 STAYS = 1e-7  # part of the largest acceleration, below which what begins to slide goes nowhere
 JAMMED = 1e-9  # eigenvalue, of rows of size 1, below which forces press no row
 CLEAR = 1e-5  # likewise, of what goes on where others have come to a jam
@@ -71,7 +71,8 @@ class ModeProblem:
         self.modes = {i: self._pressed(i, slides) for i in contacts}
         self.pressed_in = list[int]()
         self._strict = False
-        self.scale = float(np.abs(seen.bare).max(initial=0.0))
+        held = [sliding.mu[i] * seen.G[seen.at[i], seen.at[i]] for i in sliding.dry.intersection(contacts)]
+        self.scale = float(max(np.abs(seen.bare).max(initial=0.0), NOTHING * max(held, default=0.0)))
         self.limit = AGREES * self.scale
 
     def consistent(self) -> Tried | None:
@@ -79,7 +80,7 @@ class ModeProblem:
         modes = {**self.modes, **dict.fromkeys(self.begins, Mode.SLIP)}
         ways = {**self.slides, **self.begins}
         found = self._pivoted(modes, ways) or self._swept(modes, ways) or self._searched(modes)
-        if found is not None and self._strays(found) > self.limit:
+        if found is not None and self._strays(found) > OTHERWISE * self.scale:
             self._strict = True
             met = self._pivoted(modes, ways) or self._swept(modes, ways)
             found, self._strict = met or found, met is not None

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from crossbody.cases import Mode, Outcome, Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Body, Joint, Loop, Scene
+from crossbody.cases.scene import Body, Joint, Loop, Scene, Tendon
 from crossbody.reference import simulate
 from crossbody.reference.tree.system import system
 
@@ -17,8 +17,8 @@ LASTS = 0.05  # s
 Losses = tuple[float, float, float]  # dry friction of crank and rod, N m, and of the slide, N
 
 
-def slider_crank(losses: Losses, mass: float) -> Scene:
-    """A crank of 1 kg, a rod of 1 kg and a slide, whose joints have dry friction, without gravity."""
+def slider_crank(losses: Losses, mass: float, gravity: float = 0.0) -> Scene:
+    """A crank of 1 kg, a rod of 1 kg and a slide, whose joints have dry friction."""
     bodies = (
         Body(name="crank", mass=1.0, com=(CRANK / 2, 0, 0), inertia=(0.01, 0.01, 0.01, 0, 0, 0)),
         Body(name="rod", parent="crank", mass=1.0, com=(ROD / 2, 0, 0), inertia=(0.02, 0.02, 0.02, 0, 0, 0),
@@ -31,7 +31,7 @@ def slider_crank(losses: Losses, mass: float) -> Scene:
         Joint(name="slide", body="slide", type="slide", axis=(1, 0, 0), friction_loss=losses[2]),
     )
     closed = Loop(name="pin", type="connect", first="rod", second="slide", first_position=(ROD, 0, 0))
-    return Scene(bodies=bodies, joints=joints, loops=(closed,), gravity=(0, 0, 0))
+    return Scene(bodies=bodies, joints=joints, loops=(closed,), gravity=(0, 0, -gravity))
 
 
 def geometry(angle: float) -> tuple[float, float, float]:
@@ -41,7 +41,9 @@ def geometry(angle: float) -> tuple[float, float, float]:
     return float(rod), float(turns), float(-CRANK * np.sin(angle) - ROD * np.sin(rod) * turns)
 
 
-def moved(angle: float, speed: float, losses: Losses, mass: float, t_end: float) -> tuple[float, float]:
+def moved(
+    angle: float, speed: float, losses: Losses, mass: float, t_end: float, gravity: float = 0.0
+) -> tuple[float, float]:
     """Angle and speed of the crank by Lagrange's equation of its single coordinate."""
 
     def inertia(at: float) -> float:
@@ -53,7 +55,8 @@ def moved(angle: float, speed: float, losses: Losses, mass: float, t_end: float)
         e = 1e-4
         steep = (inertia(y[0] - 2 * e) - 8 * inertia(y[0] - e) + 8 * inertia(y[0] + e) - inertia(y[0] + 2 * e)) / 12 / e
         _, turns, slides = geometry(y[0])
-        force = -np.sign(y[1]) * (losses[0] + losses[1] * abs(1.0 + turns) + losses[2] * abs(slides))
+        force = -np.sign(y[1] or -gravity) * (losses[0] + losses[1] * abs(1.0 + turns) + losses[2] * abs(slides))
+        force -= gravity * CRANK * np.cos(y[0])  # of the crank's middle and the rod's, 1 kg each
         return [y[1], (force - 0.5 * steep * y[1] ** 2) / inertia(y[0])]
 
     found = solve_ivp(rate, (0.0, t_end), [angle, speed], rtol=1e-11, atol=1e-13, method="DOP853", max_step=1e-3)
@@ -84,3 +87,48 @@ def test_a_slide_turns_round_at_its_dead_centre_without_a_stop(seed: int, rtol: 
     ends = moved(angle, speed, losses, mass, LASTS)
     np.testing.assert_allclose((found.q[-1, 0], found.v[-1, 0]), ends, rtol=30 * rtol)
     assert not [event for event in found.events if event.t > 0.0 and Mode.STICK in (event.before, event.after)]
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize("slide", [0.1, 1.0, 10.0])
+def test_a_crank_falls_from_rest_at_its_dead_centre(slide: float, rtol: float) -> None:
+    """Nothing asks the slide to move there, and it sticks; what it bears once it could move is not left unseen."""
+    losses, mass, gravity = (0.05, 0.0, slide), 0.5, 9.81
+    scene = slider_crank(losses, mass, gravity)
+    q, v = np.zeros(3), np.zeros(3)
+    found = simulate(system(scene, case_of(scene).law, q), q, v, LASTS, rtol=rtol)
+    assert found.outcome is Outcome.FINISHED, found.message
+    ends = moved(0.0, 0.0, losses, mass, LASTS, gravity)
+    np.testing.assert_allclose((found.q[-1, 0], found.v[-1, 0]), ends, rtol=100 * rtol)
+
+
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+@pytest.mark.parametrize("seed", range(24))
+def test_a_tendon_turns_round_where_it_is_shortest(seed: int, solver: str) -> None:
+    """There its friction moves nothing: one body on a hinge, of which a point is tied to one that does not move."""
+    rng = np.random.default_rng([seed, 3])
+    far, near, mass, inertia = 1.0, 0.4, 1.0, 0.02 + 0.09
+    angle, speed = float(rng.choice([0.0, -0.3, -1e-3])), float(10.0 ** rng.uniform(-0.3, 1.3))
+    tendon, hinge = float(rng.choice([0.1, 1.0, 10.0])), float(rng.choice([0.0, 0.01, 0.1]))
+    scene = Scene(
+        bodies=(Body(name="arm", mass=mass, com=(0.3, 0, 0), inertia=(0.02, 0.02, 0.02, 0, 0, 0)),),
+        joints=(Joint(name="hinge", body="arm", type="hinge", axis=(0, -1, 0), friction_loss=hinge),),
+        tendons=(Tendon(name="tie", bodies=("", "arm"), positions=((far, 0, 0), (near, 0, 0)), friction_loss=tendon),),
+        gravity=(0, 0, 0),
+    )
+    q, v, t_end = np.array([angle]), np.array([speed]), 0.2 / speed
+    found = simulate(system(scene, case_of(scene).law, q), q, v, t_end, rtol=1e-9, solver=solver)
+    assert found.outcome is Outcome.FINISHED, found.message
+
+    def length(at: float) -> float:
+        return float(np.sqrt(far**2 + near**2 - 2.0 * far * near * np.cos(at)))
+
+    # Of a body that only turns forward: friction takes what its path asks for, and no integration is needed.
+    ends = float(found.q[-1, 0])
+    way = (
+        abs(length(ends) - length(0.0)) + abs(length(angle) - length(0.0))
+        if angle < 0.0 < ends
+        else (abs(length(ends) - length(angle)))
+    )
+    left = 0.5 * inertia * speed**2 - tendon * way - hinge * abs(ends - angle)
+    assert 0.5 * inertia * found.v[-1, 0] ** 2 == pytest.approx(left, abs=1e-7 * inertia * speed**2)
