@@ -52,10 +52,15 @@ class Sheet:
         self.ranges: dict[int, tuple[float, float]] = {}
         self.far: dict[str, list[tuple[float, str, str]]] = {}
         self.limits: list[tuple[int, float, str]] = []
+        self.bands: list[tuple[int, float, str]] = []
 
     def limit(self, row: int, value: float, name: str) -> None:
         """Draw what a plot's lines may reach and be within."""
         self.limits.append((row, value, name))
+
+    def band(self, row: int, half: float, name: str) -> None:
+        """Draw how far a plot's lines may be from the truth's, where that is wider than a pixel."""
+        self.bands.append((row, half, name))
 
     def logarithmic(self, *rows: int) -> None:
         """Make the y axes of these plots (from 0 on) logarithmic."""
@@ -91,21 +96,34 @@ class Sheet:
         """The figure."""
         drawn = sorted({row for row, *_ in self.lines})
         axes, height = self._axes(drawn)
+        bands = self._seen()
         place = {row: number(i + 1) for i, row in enumerate(drawn)}
         data = [
             line
             | {"y": coded(_short(y) if row in self.decades else y)}
             | {"xaxis": f"x{place[row]}", "yaxis": f"y{place[row]}"}
+            | ({"band": [half for half, _ in bands[row]]} if row in bands and line["meta"] == TRUTH else {})
             for row, y, line in self.lines
         ]
-        layout = {"title": {"text": self._caption(drawn)}, "height": height, "showlegend": False} | axes
+        layout = {"title": {"text": self._caption(drawn, bands)}, "height": height, "showlegend": False} | axes
         limits = [(f"y{place[row]}", value, name) for row, value, name in self.limits if row in place]
         return {"data": data, "layout": layout | {"shapes": [_level(*one) for one in limits]}}
 
-    def _caption(self, drawn: Sequence[int]) -> str:
+    def _seen(self) -> dict[int, list[tuple[float, str]]]:
+        """Half widths and names of the bands that are wider than a pixel beside the motion of their truth."""
+        spans = {row: np.ptp(y[np.isfinite(y)]) for row, y, line in self.lines if line["meta"] == TRUTH}
+        found: dict[int, list[tuple[float, str]]] = {}
+        for row, half, name in self.bands:
+            if 2.0 * half * PLOT > spans.get(row, np.inf):
+                found.setdefault(row, []).append((half, name))
+        return found
+
+    def _caption(self, drawn: Sequence[int], bands: Mapping[int, Sequence[tuple[float, str]]]) -> str:
         empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
         told = [f"Empty and left out: {', '.join(empty)}"] if empty else []
         told += [f"Off scale: {off_scale(self.far)}"] if self.far else []
+        names = dict.fromkeys(name for each in bands.values() for _, name in each)
+        told += [f"Grey around the truth: {', '.join(names)}"] if names else []
         return ". ".join([self.title, *told])
 
     def _axes(self, drawn: Sequence[int]) -> tuple[dict[str, Any], int]:

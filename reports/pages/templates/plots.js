@@ -146,6 +146,20 @@
       });
     }
   };
+  // How far lines may be from one, around it: an outline a stretch without gaps.
+  const around = (line) => (line.band || []).map((half) => {
+    const [x, y] = [[], []];
+    const put = (at, side) => { x.push(line.x[at]); y.push(line.y[at] + side); };
+    for (let [from, i] = [0, 0]; i <= line.y.length; i += 1) {
+      if (Number.isFinite(line.y[i])) continue;
+      for (let k = from; k < i; k += 1) put(k, half);
+      for (let k = i - 1; k >= from; k -= 1) put(k, -half);
+      put(i, NaN);
+      from = i + 1;
+    }
+    const { meta, xaxis, yaxis } = line;
+    return { type: "scatter", mode: "lines", x, y, meta, xaxis, yaxis, line: { width: 0 }, fill: "toself", fillcolor: "rgba(136,136,136,.3)", hoverinfo: "skip" };
+  });
   const visible = (data) => data.map((trace) => (trace.meta && !crossbody.shown(trace.meta) ? false : true));
 
   let busy = false;
@@ -214,6 +228,7 @@
     narrow(box, figure);
     const mark = document.createElement("div");
     mark.className = "cursor";
+    figure.data.push(...figure.data.flatMap(around));
     const shown = visible(figure.data);
     figure.data.forEach((trace, i) => { trace.visible = shown[i]; });
     charts.set(box, { mark, over });
