@@ -38,7 +38,11 @@ def style(trace: Trace, i: int) -> dict[str, Any]:
     """
     if label(trace) == TRUTH:
         return {"color": "#888888", "dash": "solid", "width": 4, "strokes": "none"}
-    i = trace.about.get("place", i)
+    return look(trace.about.get("place", i))
+
+
+def look(i: int) -> dict[str, Any]:
+    """Colour, dash and width of the engine at place i."""
     dash = DASHES[(i + 2 * (i // len(COLOURS))) % len(DASHES)]  # like colours come with other dashes
     return {"color": COLOURS[i % len(COLOURS)], "dash": dash, "width": 1.8, "strokes": STROKES[dash]}
 

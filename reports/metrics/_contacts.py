@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats

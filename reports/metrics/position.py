@@ -10,7 +10,6 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.equations import SAMPLES, equations, spread
 from crossbody.reports.measuring.scale import least, of_like
 from crossbody.reports.measuring.truth import Truth
 
@@ -88,6 +87,8 @@ def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:
     A gap is known no better than the positions of which it is a function, by as much as it changes with each; but where
     the equations are not known, or discrete variables change them, than the widest of all.
     """
+    from crossbody.reports.measuring.equations import SAMPLES, equations, spread  # numba, which a page does without
+
     motion, system = truth.trajectory, equations(case)
     own: Floats = np.max(np.abs(motion.gap[:, rows]), axis=0, initial=0.0)
     widest = max(float(own.max()), ROUNDING * float(np.max(np.abs(motion.q), initial=0.0)))

@@ -22,8 +22,8 @@ RUNS = (
     "lines over ladders of tolerances and steps, run crossbody bench, then crossbody report --with."
 )
 ALL = (
-    "Every engine on every case, each at its own setting; lower left is better. Click a name "
-    "in the legend to hide that engine, double-click to show it alone."
+    "Every engine on every case, each at its own setting; lower left is better. An engine's name stands "
+    "beside its largest error; the buttons above hide engines."
 )
 LADDERS = (
     "One line for each engine, with a point for every tolerance or step; lower left is better. "
@@ -65,7 +65,10 @@ def overview(found: Results) -> list[Section]:
 
 
 def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapping[str, int]) -> Figure:
-    """One mark a case, a colour and a symbol an engine: error of position (relative), run time in ms."""
+    """One mark a case, a colour and a symbol an engine: error of position (relative), run time in ms.
+
+    Marks of an engine are in the order of their errors: the page writes its name beside the last.
+    """
     data = [
         {
             "type": "scatter", "mode": "markers", "x": [error for _, error, _ in mine],
@@ -74,12 +77,13 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapp
             "hovertemplate": "%{text}<br>error %{x:.2g}, %{y:.3g} ms<extra>" + plain(who) + "</extra>",
             "marker": _mark(places[who]) | {"size": 9, "opacity": 0.8},
         }
-        for who, mine in sorted(points.items(), key=lambda one: places[one[0]])
+        for who, given in sorted(points.items(), key=lambda one: places[one[0]])
+        for mine in (sorted(given, key=lambda one: one[1]),)
     ]  # fmt: skip
     every = [one for mine in points.values() for one in mine]
     layout = {
         "title": {"text": "Run time against error of position, one mark for each case"}, "height": 460,
-        "showlegend": True,
+        "showlegend": True, "meta": "marks",
         "xaxis": _decades("relative error of position", [error for _, error, _ in every]),
         "yaxis": _decades("run time [ms]", [ms for *_, ms in every]),
     }  # fmt: skip

@@ -63,9 +63,11 @@ def correlation(rows: pd.DataFrame) -> Figure:
         band = float(chosen["band"].iloc[0])
         shapes.append(_rectangle(place, y=(-band, band)))
     names = [f"{channel} with\n{given or 'itself'}" for channel, given in kinds]
-    return _figure(
+    made = _figure(
         "Correlation of the residuals; 99 % band in grey", data, names, "lag [averages of residuals]", shapes
     )
+    made["layout"]["meta"] = "ends"  # where the page names lines
+    return made
 
 
 def profile(rows: pd.DataFrame, estimates: pd.DataFrame) -> Figure:

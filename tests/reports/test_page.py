@@ -332,16 +332,18 @@ def test_the_index_tells_error_and_cost_of_every_engine(out: Path) -> None:
 
 @pytest.mark.parametrize("word", [Word.WITHIN, Word.EXPECTED, Word.OUTSIDE])
 def test_a_cell_is_the_warmer_the_farther_out(word: Word) -> None:
-    def heat(value: float) -> int:
-        row = Verdict(case="c", variant="v", engine="e", profile="p", metric="m", value=value, unit="1", limit=1e-6,
+    def heat(value: float, limit: float = 1e-6) -> int:
+        row = Verdict(case="c", variant="v", engine="e", profile="p", metric="m", value=value, unit="1", limit=limit,
                       tier="A", verdict=word).row()  # fmt: skip
         return grid.heat_of(row)
 
-    sizes = [0.0, *(1e-6 * 10.0 ** (np.arange(-14, 15) / 2.0 - (7.0 if word is Word.WITHIN else -7.0))), np.inf]
+    sizes = [0.0, *(1e-6 * 10.0 ** (np.arange(-28, 29) / 2.0 - (7.0 if word is Word.WITHIN else -7.0))), np.inf]
+    assert heat(0.0 if word is Word.WITHIN else 2.0, limit=0.0) == (0 if word is Word.WITHIN else -1)
     steps = [heat(size) for size in sizes]
     assert steps == sorted(steps)
-    assert {0, 6} <= set(steps) <= set(range(7))
-    assert heat(np.nan) == 6
+    most = 6 if word is Word.WITHIN else 12
+    assert {0, most} <= set(steps) <= set(range(most + 1))
+    assert heat(np.nan) == most
 
 
 @pytest.mark.parametrize("seed", range(50))
@@ -359,7 +361,7 @@ def test_what_is_beyond_a_limit_for_a_known_cause_is_as_warm_and_as_high_as_what
     assert [line.text for line in lines] == [f"m{i}" for i in np.argsort(-times)]
     for line in lines:
         size = times[int(line.text[1:])]
-        assert size < 1.0 or line.cells[0].heat == min(int(np.log10(size)), 6)
+        assert size < 1.0 or line.cells[0].heat == int(np.log10(size))
         assert line.cells[0].heat >= 0
 
 
