@@ -93,7 +93,8 @@ def test_a_limit_on_what_is_off_the_truth_is_a_band_around_it_where_one_sees_it(
     assert "Grey around the truth: limit" in figure["layout"]["title"]["text"]
     run = truth.trajectory
     shift = {
-        "position": replace(run, q=run.q + half), "energy_drift": replace(run, energy=run.energy + np.array([half, 0.0])),
+        "position": replace(run, q=run.q + half),
+        "energy_drift": replace(run, energy=run.energy + np.array([half, 0.0])),
         "gap_error": replace(run, gap=run.gap + half), "penetration_error": replace(run, gap=run.gap - half),
     }  # fmt: skip
     if metric in shift:

@@ -207,10 +207,10 @@ def test_marks_of_an_engine_are_named_beside_the_last(seed: int, tmp_path: Path,
     assert browser.js(LEGEND) == 0
     assert browser.js(OVERLAPS) == []
     starts, axes = browser.js(
-        "(() => { const { xaxis: x, yaxis: y } = document.querySelector('.plot')._fullLayout; return ["
-        "[...document.querySelectorAll('.names path')].map((one) => one.getAttribute('d').match(/M([-\\d.]+) ([-\\d.]+)/)"
-        ".slice(1).map(Number)), document.querySelector('.plot').data.map(({ x: a, y: b }) => [x._offset + x.d2p(a.at(-1)),"
-        " y._offset + y.d2p(b.at(-1))])]; })()"
+        "(() => { const box = document.querySelector('.plot'), { xaxis: x, yaxis: y } = box._fullLayout;"
+        " const from = (d) => d.match(/M([-\\d.]+) ([-\\d.]+)/).slice(1).map(Number);"
+        " return [[...document.querySelectorAll('.names path')].map((one) => from(one.getAttribute('d'))),"
+        " box.data.map((one) => [x._offset + x.d2p(one.x.at(-1)), y._offset + y.d2p(one.y.at(-1))])]; })()"
     )
     assert np.allclose(sorted(starts), sorted(axes), atol=0.6)
     assert all(line["x"] == sorted(line["x"]) for line in cloud["data"])
