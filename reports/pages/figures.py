@@ -293,7 +293,8 @@ def penetration(
     for row, (k, on) in enumerate(zip(shown, always, strict=True)):
         for i, trace in enumerate(traces):
             depth = _depth(trace.run.gap[:, k], on)
-            sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, np.nan))
+            above = np.where(np.isnan(depth), np.nan, np.nan if on else 0.0)  # none is seen on a logarithmic axis
+            sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, above))
         if contacts[k] not in turn:
             for limit, name in limits.get("constraint_drift" if on else "penetration", {}).items():
                 sheet.limit(row, limit, name)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import beyond, runs_of, share
+from crossbody.reports.judging.told import WRONG, beyond, runs_of, share
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
 from crossbody.reports.pages.html import number
@@ -134,9 +134,10 @@ def held(row: Row) -> bool:
 
 def heat_of(row: Row) -> int:
     """How many decades a number is beyond its limit, as a step of its colour; within, beyond a millionth of it."""
-    if not held(row) or (row["verdict"] != Word.WITHIN and not row["limit"]):
-        return -1  # nothing is a number of times what must be exact
     times = share(row)
+    known = row["verdict"] in (Word.WITHIN, *WRONG) or times < math.inf
+    if not held(row) or not known or (row["verdict"] != Word.WITHIN and not row["limit"]):
+        return -1  # nothing is a number of times what must be exact, and what has no number is none
     decades = math.log10(times) if 0.0 < times < math.inf else -math.inf if times == 0.0 else math.inf
     if row["verdict"] == Word.WITHIN:
         return int(min(max(decades + NEAREST, 0.0), NEAREST))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -105,17 +104,6 @@ def _mark(place: int) -> dict[str, str]:
     return {"color": COLOURS[place % len(COLOURS)], "symbol": SYMBOLS[place % len(SYMBOLS)]}
 
 
-def _sides(heights: Sequence[float]) -> list[str]:
-    """Where a name stands beside a mark of some height: of marks of about one height above, at or below it."""
-    order = sorted(range(len(heights)), key=lambda i: heights[i])
-    logs = [math.log10(max(heights[i], FLOOR)) for i in order]
-    close = 0.05 * (max(logs, default=0.0) - min(logs, default=0.0) + 1.0)
-    near = [False, *(b - a < close for a, b in pairwise(logs)), False]
-    sides = {(False, True): "bottom", (True, False): "top"}
-    found = {i: sides.get((below, above), "middle") for i, (below, above) in zip(order, pairwise(near), strict=True)}
-    return [found[i] for i in range(len(heights))]
-
-
 def _limits(rows: Sequence[Row]) -> list[float]:
     """Return the limits on the error of position."""
     return sorted({row["limit"] for row in rows if row["metric"] == "position" and (row["limit"] or 0.0) > 0.0})
@@ -129,19 +117,17 @@ def scatter(
     edge = 10.0 * max([*finite, FLOOR])
     data = [
         {
-            "type": "scatter", "mode": "markers+text",
+            "type": "scatter", "mode": "markers",
             "x": [max(error, FLOOR) if math.isfinite(error) else edge], "y": [ms],
-            "name": plain(who), "meta": who, "text": [plain(who)],
-            # names stand inside the plot
-            "textposition": f"{side} left" if not math.isfinite(error) or error > 1e-4 * edge else f"{side} right",
-            "textfont": {"size": 11}, "cliponaxis": False,
+            "name": plain(who), "meta": who, "cliponaxis": False,
             "marker": _mark(places[who]) | {"size": 10} | ({} if math.isfinite(error) else {"symbol": "x"}),
         }
-        for (who, error, ms), side in zip(points, _sides([ms for *_, ms in points]), strict=True)
+        for who, error, ms in points
     ]  # fmt: skip
     told = f". Dashed: {'limits' if len(limits) > 1 else 'limit'} of the error" if limits else ""
     layout = {
         "title": {"text": f"Run time against error of position{told}"}, "height": 420, "showlegend": False,
+        "meta": "marks",
         "shapes": [
             {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in limits
         ],

@@ -110,11 +110,11 @@ class Sheet:
         return {"data": data, "layout": layout | {"shapes": [_level(*one) for one in limits]}}
 
     def _seen(self) -> dict[int, list[tuple[float, str]]]:
-        """Half widths and names of the bands that are wider than a pixel beside the motion of their truth."""
-        spans = {row: np.ptp(y[np.isfinite(y)]) for row, y, line in self.lines if line["meta"] == TRUTH}
+        """Half widths and names of the bands that are wider than a pixel of their plot."""
         found: dict[int, list[tuple[float, str]]] = {}
-        for row, half, name in self.bands:
-            if 2.0 * half * PLOT > spans.get(row, np.inf):
+        for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
+            seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
+            if 2.0 * half * PLOT > np.ptp(seen):
                 found.setdefault(row, []).append((half, name))
         return found
 

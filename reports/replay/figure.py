@@ -132,7 +132,7 @@ def _line(x: Floats, y: Floats, name: str, place: int, i: int = 0) -> dict[str, 
         "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)),
         "name": plain(name), "legendgroup": plain(name), "showlegend": place == 1, "line": look,
         "xaxis": f"x{axis}", "yaxis": f"y{axis}",
-    }  # fmt: skip
+    } | ({"meta": name} if i else {})  # fmt: skip
 
 
 def _band(t: Floats, y: Floats, noise: float, place: int) -> Iterator[dict[str, Any]]:

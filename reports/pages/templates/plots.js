@@ -47,7 +47,7 @@
     made.append(...inside);
     return made;
   };
-  const own = (line) => line.name && (line.line || line.marker) && !line.fill && line.type !== "bar" && line.visible !== false;
+  const own = (line) => line.name && (line.line || line.mode === "markers") && !line.fill && line.type !== "bar" && line.visible !== false;
   const last = ({ x, y }, high = Infinity) => {
     let i = x.length - 1;
     while (i >= 0 && !(x[i] <= high && Number.isFinite(y[i]))) i -= 1;
@@ -77,26 +77,30 @@
   };
   const named = (box, { data, layout }) => {
     const lines = data.filter(own);
-    if (!lines.length) return null;
     const timed = box.hasAttribute("data-time");
+    const [wide, pen] = [box.clientWidth >= NARROW, document.createElement("canvas").getContext("2d")];
+    pen.font = "11px system-ui, sans-serif";
+    const room = (text) => ROOM + Math.ceil(pen.measureText(text).width);
+    const beside = (texts) => { layout.margin = { ...layout.margin, r: Math.min(Math.max(...texts.map(room)) + 8, 0.4 * box.clientWidth) }; };
+    const engines = [...box.closest("[data-page]").querySelectorAll("[data-show]")].map((each) => `${each.dataset.show} until 0.555 s`);
+    if (timed && wide && engines.length) beside(engines); // one instant is at one place in all figures of a page
+    if (!lines.length) return null;
     if (!timed && !layout.meta) { // lines in a plane end anywhere, often on each other
-      const engines = lines.filter(({ meta }) => meta);
-      if (layout.showlegend === false && engines.length) below(box, engines);
+      const known = lines.filter(({ meta }) => meta);
+      if (layout.showlegend === false && known.length) below(box, known);
       return null;
     }
     if (timed) entitle(lines);
     else lines.forEach((line) => { line.title = plainly(line); });
     const over = drawing("svg", { class: "names", "aria-hidden": "true" });
-    if (box.clientWidth < NARROW) {
+    const marks = layout.meta === "marks";
+    if (!wide && !(marks && layout.showlegend === false)) {
       if (layout.showlegend === false) below(box, lines); // others have a legend
       return over;
     }
     over.dataset.named = layout.meta || "ends";
-    const pen = document.createElement("canvas").getContext("2d");
-    pen.font = "11px system-ui, sans-serif";
-    lines.forEach((line) => Object.assign(line, { showlegend: false, wide: ROOM + Math.ceil(pen.measureText(line.title).width) }));
-    const wide = Math.max(...lines.map((line) => line.wide));
-    if (layout.meta !== "marks") layout.margin = { ...layout.margin, r: Math.min(wide + 8, 0.4 * box.clientWidth) };
+    lines.forEach((line) => Object.assign(line, { showlegend: false, wide: room(line.title) }));
+    if (!marks && !(timed && engines.length)) beside(lines.map(({ title }) => title));
     return over;
   };
   // Where a line leaves its plot, pixels; nothing where it is not seen.
