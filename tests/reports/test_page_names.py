@@ -270,3 +270,54 @@ def test_an_engine_that_is_hidden_leaves_every_table(name: str, page: Path, brow
     assert browser.js("document.querySelectorAll('.table tr[data-engine]:not([hidden])').length") > 1
     browser.js("document.querySelector('[data-show-all]').click()")
     assert browser.js(f"{rows}.every((row) => !row.hidden)")
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_marks_that_are_near_have_names_apart(width: int, tmp_path: Path, browser: chromium.Browser) -> None:
+    engines = [f"engine:profile {k}" for k in range(6)]
+    marks = [(who, 1e-9 * (1.0 + 0.02 * k), 5.0 + 0.1 * k) for k, who in enumerate(engines)]
+    figure = precision.scatter(
+        [*marks, ("far:off", float("inf"), 5.0)], {who: k for k, who in enumerate([*engines, "far:off"])}
+    )
+    drawn(tmp_path, figure, browser, width)
+    assert sorted(browser.js(TEXTS)) == sorted([*engines, "far:off"])
+    assert browser.js(OVERLAPS) == []
+    assert browser.complaints() == []
+
+
+def test_one_instant_is_at_one_place_in_all_figures(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    browser.wait(DRAW)
+    ends = browser.js(
+        "[...document.querySelectorAll('.plot[data-time]')].map((box) => box._fullLayout.xaxis._offset"
+        " + box._fullLayout.xaxis._length)"
+    )
+    assert len(ends) >= 4
+    assert len(set(ends)) == 1
+
+
+def test_a_hidden_engine_leaves_the_figures_of_a_replay(tmp_path: Path, browser: chromium.Browser) -> None:
+    t = np.linspace(0.0, 1.0, 20)
+    rows = pd.concat([
+        pd.DataFrame({"who": who, "channel": "th1", "unit": "rad", "window": 0, "t": t, "measured": t, "value": t})
+        for who in ("reference:compiled", "mujoco:default")
+    ])  # fmt: skip
+    for draw in (replays.motion, replays.residual):
+        drawn(tmp_path, draw(rows, {"th1": 0.1}), browser, time=True)
+        hide = "crossbody.hidden.add('mujoco:default'); crossbody.tell('engines'); document.querySelector('.plot').data"
+        left = browser.js(f"{hide}.filter(({{ visible }}) => visible).map(({{ name }}) => name)")
+        assert "reference:compiled" in left
+        assert "mujoco:default" not in left
+
+
+def test_bars_to_measure_by_lie_over_nothing_on_a_narrow_screen(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page, width=400)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    browser.wait("document.querySelector('[data-speed]').options.length > 0")
+    colours = browser.js(
+        "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {"
+        " const c = document.querySelector('.player canvas'), k = c.width / c.clientWidth;"
+        " const found = c.getContext('2d').getImageData(0.65 * c.width, c.height - 48 * k, 0.1 * c.width, 48 * k);"
+        " done(new Set(new Uint32Array(found.data.buffer)).size); })))"
+    )
+    assert colours == 1
