@@ -64,6 +64,13 @@ def coded(array: Floats | NDArray[np.float32]) -> dict[str, str]:
     return {"dtype": f"f{array.itemsize}", "bdata": text} | shape
 
 
+def level(axis: str, value: float, name: str) -> dict[str, Any]:
+    """A line across the plot of a y axis, and what it is, which the page writes over all lines."""
+    ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
+    line = {"color": LEVEL, "width": 1.2, "dash": "dash"}
+    return {"type": "line", "layer": "above", "line": line, "name": name} | ends
+
+
 class Panels:
     """Plots of one figure in rows and columns.
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import LEVEL, coded, label, number, plain, style
+from crossbody.reports.figures.styles import coded, label, level, number, plain, style
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep
@@ -107,7 +107,7 @@ class Sheet:
         ]
         layout = {"title": {"text": self._caption(drawn, bands)}, "height": height, "showlegend": False} | axes
         limits = [(f"y{place[row]}", value, name) for row, value, name in self.limits if row in place]
-        return {"data": data, "layout": layout | {"shapes": [_level(*one) for one in limits]}}
+        return {"data": data, "layout": layout | {"shapes": [level(*one) for one in limits]}}
 
     def _seen(self) -> dict[int, list[tuple[float, str]]]:
         """Half widths and names of the bands that are wider than a pixel of their plot."""
@@ -163,13 +163,6 @@ def off_scale(far: Mapping[str, Sequence[tuple[float, str, str]]]) -> str:
         f"{who} up to {size:.3g} {unit} ({where}{f' and {more} more' if more else ''})"
         for who, size, unit, where, more in told
     )
-
-
-def _level(axis: str, value: float, name: str) -> dict[str, Any]:
-    """A line across a plot, and what it is, which the page writes over all lines."""
-    ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
-    line = {"color": LEVEL, "width": 1.2, "dash": "dash"}
-    return {"type": "line", "layer": "above", "line": line, "name": name} | ends
 
 
 def _lines(name: str) -> str:

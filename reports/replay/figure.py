@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,12 @@ import pandas as pd
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES, coded, number, plain
+from crossbody.reports.figures.styles import COLOURS, DASHES, coded, level, number, plain
 
 GREY = "#888888"
 SIGNED = [[0.0, COLOURS[0]], [0.5, "#f4f4f4"], [1.0, COLOURS[3]]]
 """Colours from -1 over 0 to 1."""
+NONE: Mapping[str, float] = {}
 SIGMAS = 2.0  # half of the noise band, standard deviations
 
 
@@ -36,8 +37,13 @@ def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()
                    _shades(rows, held, len(channels)))  # fmt: skip
 
 
-def residual(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:
-    """Measured less predicted over time beside the noise's band, a plot a channel, a line an engine."""
+def residual(
+    rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = (), limits: Mapping[str, float] = NONE
+) -> Figure:
+    """Measured less predicted over time beside the noise's band, a plot a channel, a line an engine.
+
+    Limits are the largest that is within, by channel.
+    """
     channels = _channels(rows)
     data, shapes = [], list(_shades(rows, held, len(channels)))
     for place, (channel, _) in enumerate(channels, start=1):
@@ -46,6 +52,7 @@ def residual(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = 
             data.append(_line(t, left, str(who), place, i))
         half = SIGMAS * noise.get(channel, np.nan)
         shapes += [_rectangle(place, y=(-half, half))] if np.isfinite(half) else []
+        shapes += [level(f"y{number(place)}", side * limits[channel], "limit") for side in (-1, 1) if channel in limits]
     return _figure(
         "Measured less predicted", data, [f"{name}\n[{unit}]" for name, unit in channels], "time [s]", shapes
     )
