@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import re
 import subprocess
@@ -32,7 +31,6 @@ from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import KeptTemplates, Page, plot
-from crossbody.reports.pages.precision import scatter
 from crossbody.reports.runs import study
 from crossbody.reports.runs.files import file_name
 from crossbody.reports.runs.jobs import CaseResult
@@ -617,22 +615,6 @@ def test_the_limits_of_position_stand_in_the_picture_of_run_time_over_error(out:
         figure = all_plots(page)["precision"]
         assert [shape["x0"] for shape in figure["layout"]["shapes"]] == limits
         assert "Dashed: limit of the error" in page.read_text()
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_names_of_marks_of_one_height_do_not_all_stand_at_it(seed: int) -> None:
-    draw = np.random.default_rng(seed)
-    heights = 10.0 ** draw.uniform(-1.0, 3.0, draw.integers(1, 6))
-    close = 0.05 * (np.ptp(np.log10(heights)) + 1.0)
-    marks = [("e", 1.0, float(ms)) for ms in heights]
-    sides = [str(line["textposition"]).split()[0] for line in scatter(marks, {"e": 0})["data"]]
-    for i, j in itertools.pairwise(np.argsort(heights)):
-        low, high = sides[i], sides[j]
-        beside = np.log10(heights[j] / heights[i]) < close
-        assert (
-            (low in ("bottom", "middle") and high in ("middle", "top") and low != high) or not beside or len(marks) > 2
-        )
-        assert beside or (low != "bottom" and high != "top")
 
 
 @pytest.mark.parametrize("seed", range(30))
