@@ -25,6 +25,7 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 """Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one
 group, between groups (with times), pixels."""
 NAME = 12  # height of the name of a line beside its plot, pixels
+SEEN = 6  # height of a band that is seen around the truth, pixels
 DIGITS = 12  # of the mantissa of a value on a logarithmic axis, bits: four decimal ones
 MODE_COLOURS = {
     Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
@@ -59,7 +60,7 @@ class Sheet:
         self.limits.append((row, value, name))
 
     def band(self, row: int, half: float, name: str) -> None:
-        """Draw how far a plot's lines may be from the truth's, where that is wider than a pixel."""
+        """Draw how far a plot's lines may be from the truth's, where that is wider than its line."""
         self.bands.append((row, half, name))
 
     def logarithmic(self, *rows: int) -> None:
@@ -110,11 +111,11 @@ class Sheet:
         return {"data": data, "layout": layout | {"shapes": [level(*one) for one in limits]}}
 
     def _seen(self) -> dict[int, list[tuple[float, str]]]:
-        """Half widths and names of the bands that are wider than a pixel of their plot."""
+        """Half widths and names of the bands that are wider than the line that they are around."""
         found: dict[int, list[tuple[float, str]]] = {}
         for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
             seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
-            if 2.0 * half * PLOT > np.ptp(seen):
+            if 2.0 * half * PLOT > SEEN * np.ptp(seen):
                 found.setdefault(row, []).append((half, name))
         return found
 

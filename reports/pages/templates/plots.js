@@ -139,8 +139,8 @@
       const right = x._offset + x._length;
       const limits = (all.shapes || []).filter(({ yref, name: text }) => text && yref === key).map((shape) => [shape.name, y.d2p(shape.y0)])
         .filter(([, at]) => at >= 0 && at <= y._length).sort(([, a], [, b]) => a - b);
-      spread(limits.map(([, at]) => at - TALL / 2), y._length).forEach((middle, k) => { // above the line
-        over.append(drawing("text", { class: "limit", x: right - 3, y: y._offset + middle + 3 }, limits[k][0]));
+      spread(limits.map(([, at]) => at + TALL / 2), y._length + TALL).forEach((middle, k) => { // above the line, also of the highest
+        over.append(drawing("text", { class: "limit", x: right - 3, y: y._offset + middle - TALL + 3 }, limits[k][0]));
       });
       if (!over.dataset.named) continue;
       const inside = over.dataset.named === "marks";
