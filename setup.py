@@ -1,4 +1,4 @@
-"""Find the packages: each top-level folder is one of crossbody, which the wheel makes a regular package.
+"""Find the packages: each top-level folder is one of crossbody, which is itself what is in reports/package.
 
 A bare folder called crossbody, as that of a checkout, is a namespace to Python and yields to a regular package wherever
 that is installed: a script beside a checkout imports what was installed.
@@ -18,17 +18,15 @@ INNER = [f"{folder}.{name}" for folder in FOLDERS for name in find_namespace_pac
 SCRIPT = Path(__file__).parent / "reports" / "pages" / "templates" / "plotly.min.js"
 
 
-class Regular(build_py):
-    """Build with plotly's script and a `crossbody/__init__.py`; an editable one finds the folders by itself."""
+class WithScript(build_py):
+    """Build with plotly's script."""
 
     def run(self):
-        """Copy the script and the packages, and make theirs a regular one."""
+        """Copy the script, then the packages."""
         (script,) = (file for file in files("plotly") or () if file.name == SCRIPT.name)
         copyfile(script.locate(), SCRIPT)
         super().run()
-        if not self.editable_mode:
-            (Path(self.build_lib) / "crossbody" / "__init__.py").write_text('"""Installed parts of crossbody."""\n')
 
 
-setup(package_dir={f"crossbody.{folder}": folder for folder in FOLDERS}, cmdclass={"build_py": Regular},
-      packages=[f"crossbody.{name}" for name in (*FOLDERS, *INNER)])  # fmt: skip
+FOUND = {"crossbody": "reports/package"} | {f"crossbody.{folder}": folder for folder in FOLDERS}
+setup(package_dir=FOUND, cmdclass={"build_py": WithScript}, packages=[*FOUND, *(f"crossbody.{name}" for name in INNER)])

@@ -26,7 +26,9 @@ import sys
 import tomllib
 import traceback
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from functools import cache, partial
+from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
@@ -55,7 +57,31 @@ def modules(group: str) -> Mapping[str, str]:
 
 @cache
 def _entry_points(group: str) -> Mapping[str, str]:
+    finders = (one for one in sys.meta_path if one is not PathFinder and hasattr(one, "find_distributions"))
+    if not any(finders) and not any(map(_may_name_plugins, sys.path)):
+        return {}
     return {point.name: point.module for point in _every_entry_point().select(group=group)}
+
+
+@cache
+def _may_name_plugins(place: str) -> bool:
+    """Return whether what is installed there may name a plug-in: the text says it sooner than a parser."""
+    try:
+        with os.scandir(place or ".") as found:
+            names = [entry.path for entry in found if entry.name.endswith((".dist-info", ".egg-info", ".egg"))]
+    except NotADirectoryError:  # an archive, which has its own reader
+        return True
+    except OSError:
+        return False
+    return any(map(_names_plugins, names))
+
+
+def _names_plugins(distribution: str) -> bool:
+    if distribution.endswith(".egg"):
+        return True
+    with suppress(OSError), open(os.path.join(distribution, "entry_points.txt"), "rb") as file:
+        return b"[crossbody." in file.read()
+    return False
 
 
 @cache

@@ -56,7 +56,7 @@ def _rolled(run: Trajectory, variable: int, row: int, name: str) -> tuple[float,
         ahead, across = np.diff(run.gap[k : k + 2, row + 2 : row + 4] - run.gap[k : k + 2, row : row + 2], axis=0)[0]
         if abs(across) > ROLLS * np.hypot(ahead, across):
             return switch.t, (
-                f"{Outcome.ILL_POSED.advice} Pair {name!r} rolls on its rim through zero tilt at "
-                f"t = {switch.t:.12g} s: the rows do not determine to which side the lowest point moves."
+                f"Pair {name!r} rolls on its rim through zero tilt at t = {switch.t:.12g} s: the rows do not determine "
+                f"to which side the lowest point moves. {Outcome.ILL_POSED.advice}"
             )
     return None

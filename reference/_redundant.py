@@ -132,8 +132,8 @@ def watched(system: System, run: Trajectory) -> Trajectory:
             k, j = np.argwhere(off > bound)[0]
             row = int(left_out[j])
             message = (
-                f"{Outcome.INCONSISTENT.advice} Row {row} followed from the others at the start "
-                f"and was left out; at t = {run.t[k]:.12g} s it has {what} = {values[k, row]:.3g}."
+                f"Row {row} followed from the others at the start and was left out; at t = {run.t[k]:.12g} s "
+                f"it has {what} = {values[k, row]:.3g}. {Outcome.INCONSISTENT.advice}"
             )
             return replace(run, outcome=Outcome.INCONSISTENT, message=message)
     lam, mode = np.array(run.lam), np.array(run.mode)

@@ -319,7 +319,7 @@ class CompiledRun:
             return " ".join(text for name, text in told.items() if self.state[name][0])
         q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
-        return f"{outcome.advice} {self._cause(outcome, q, v)}{where}."
+        return f"{self._cause(outcome, q, v)}{where}. {outcome.advice}"
 
     def _cause(self, outcome: Outcome, q: Floats, v: Floats) -> str:
         """What an outcome's message names before time and state; empty if nothing."""

@@ -91,7 +91,7 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 @click.option("--dry-run", "dry", is_flag=True, help="Show what would be run, without running it.")
 @click.option("--strict", is_flag=True, help="Exit code 1 also if a number has left its regression band.")
 @click.option(
-    "--jobs", type=click.IntRange(0, 1024), default=1, show_default=True, metavar="J",
+    "--jobs", type=options.Whole(0, 1024), default=1, show_default=True, metavar="J",
     help="Cases at once, in processes; 0: one per processor. Run times then include the mutual slowdown.",
 )  # fmt: skip
 @click.option(
@@ -117,13 +117,13 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
 
 @cli.command()
 @options.cases
-@click.option("--repeats", type=click.IntRange(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
+@click.option("--repeats", type=options.Whole(1, 1000), metavar="N", help="Timed runs of each; 3, or 7 with --full.")
 @click.option(
     "--full",
     is_flag=True,
     help="Every case and every rung of every ladder; without it, a selection that takes some minutes.",
 )
-@click.option("--minutes", type=click.FloatRange(0.1), help="Approximate total time; ladders are shortened to meet it.")
+@click.option("--minutes", type=options.Number(0.1), help="Approximate total time; ladders are shortened to meet it.")
 @click.option("--against", type=options.PATH, metavar="BASE", help="Folder of an earlier benchmark.")
 @click.option("--skip", "what", flag_value="skip", help="Instead: measure the work that a scene avoids.")
 @click.option("--throughput", "what", flag_value="throughput", help="Instead: measure many runs at once, in threads.")
@@ -143,11 +143,11 @@ def bench(what: str | None, **asked: Any) -> int:
 
 @cli.command()
 @click.option(
-    "--n", "counts", type=click.IntRange(2, 200), multiple=True, default=(3, 5), show_default=True,
+    "--n", "counts", type=options.Whole(2, 200), multiple=True, default=(3, 5), show_default=True,
     help="Number of balls; repeatable.",
 )  # fmt: skip
 @options.wanted
-@click.option("--points", type=click.IntRange(2, 10_000), default=61, show_default=True, help="Gaps from s = 0 to 3.")
+@click.option("--points", type=options.Whole(2, 10_000), default=61, show_default=True, help="Gaps from s = 0 to 3.")
 @options.out()
 @speaks
 def gapmap(**asked: Any) -> int:
@@ -171,8 +171,8 @@ def stability(**asked: Any) -> int:
 @click.argument("names", metavar="[SUITE]...", nargs=-1, shell_complete=options.names_of("reports.suites"))
 @options.wanted
 @click.option("--runs", type=int, metavar="N", help="Number of runs of the first engine, over all suites.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all draws.")
-@click.option("--jobs", type=click.IntRange(0, 1024), default=0, metavar="J", help="Processes; 0: one per processor.")
+@click.option("--seed", type=options.Whole(0), default=0, show_default=True, help="Seed of all draws.")
+@click.option("--jobs", type=options.Whole(0, 1024), default=0, metavar="J", help="Processes; 0: one per processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
 @click.option(
     "--tls-ca", default="", metavar="FILE", help="Certificates (PEM) of the authorities that may sign the scheduler's."

@@ -37,7 +37,8 @@ def test_every_folder_is_a_package(told: dict[str, Any]) -> None:
 
 
 def test_every_package_is_mapped_to_its_folder(told: dict[str, Any]) -> None:
-    assert told["package_dir"] == {f"crossbody.{folder}": folder for folder in FOLDERS}
+    parts = {f"crossbody.{folder}": folder for folder in FOLDERS}
+    assert told["package_dir"] == {"crossbody": "reports/package"} | parts
 
 
 def test_every_file_is_code_or_named_as_data() -> None:
@@ -66,6 +67,25 @@ def test_a_checkout_beside_a_script_does_not_come_before_what_is_installed(tmp_p
     done = subprocess.run(run, cwd=tmp_path, env=environment, check=True, capture_output=True, text=True)
     assert all(line.startswith(str(tmp_path / "site")) for line in done.stdout.splitlines()), done.stdout
     assert done.stderr == ""
+    module = [sys.executable, "-m", "crossbody", "list", "bouncing_ball"]
+    done = subprocess.run(module, cwd=tmp_path, env=environment, check=True, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == (shell("list", "bouncing_ball").stdout, "")
+
+
+def shell(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Return what the command says."""
+    command = [str(Path(sys.executable).with_name("crossbody")), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--version",), ("run", "bouncing_ball:listing", "--dry-run"), ("list", "nothing"), ("run", "--jbs")]
+)
+def test_the_module_does_what_the_command_does(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    module = [sys.executable, "-m", "crossbody", *arguments]
+    done = subprocess.run(module, cwd=tmp_path, capture_output=True, text=True, check=False)
+    told = shell(*arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (told.returncode, told.stdout, told.stderr)
 
 
 def test_another_checkout_than_the_editable_installation_is_told(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from crossbody.cases.errors import InvalidValue, NoFile, SceneError
-from crossbody.cases.files import mjcf, urdf
 from crossbody.cases.files.without import strip
 from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import LARGEST, Scene
@@ -47,6 +46,8 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
 
     With it sentences on what the compiler found strange.
     """
+    from crossbody.cases.files import mjcf, urdf  # which cases that are no file do without
+
     model, told = (urdf if is_urdf(path) else mjcf).read(path, without)
     strip(model, without)
     return model, told
@@ -59,12 +60,16 @@ def model_of(path: Path, without: str = "") -> mujoco.MjModel:
 
 def scene_of(path: Path, model: mujoco.MjModel) -> Scene:
     """Return the scene of a file by its model."""
+    from crossbody.cases.files import mjcf, urdf
+
     scene = mjcf.scene_of(model)
     return urdf.with_inertias(path, scene) if is_urdf(path) else scene
 
 
 def findings_of(path: Path) -> list[str]:
     """Return sentences on what is strange in a file to us, not to its compiler, but is taken as it stands."""
+    from crossbody.cases.files import urdf
+
     return urdf.findings(path) if is_urdf(path) else []
 
 

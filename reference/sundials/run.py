@@ -393,7 +393,7 @@ class SundialsRun:
             rows = self.failed or self._blamed()
         elif outcome is Outcome.ILL_POSED and self.ended_rows:
             rows = dependence(self.system, np.array(self.ended_rows), s.q, s.v)
-        return f"{outcome.advice} {rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}."
+        return f"{rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}. {outcome.advice}"
 
     def _blamed(self) -> str:
         """The kernel that gave what is not finite, at the end of the motion or behind it."""

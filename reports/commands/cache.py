@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from multiprocessing import get_context
 
 import click
@@ -16,15 +16,26 @@ from crossbody.cases.errors import several
 from crossbody.reference import ahead, code_store
 from crossbody.reference.compiling import EVERY_S, silence
 from crossbody.reports import voice
+from crossbody.reports.runs import watch
+
+Task = tuple[str, Callable[[str], None], str]
+"""What is told of it, what does it, and on which name."""
 
 
 def warm() -> int:
-    """Compile what is the same for all mechanisms, then the kernels of every case; the exit code."""
+    """Compile what is the same for all mechanisms, and the kernels of every case; the exit code.
+
+    While one processor is at the largest piece, kernels are compiled: an interrupt keeps what is ready, and they are
+    ready first.
+    """
     began = time.perf_counter()
-    steps = len(ahead.PIECES) + len(cases.names())
-    with voice.progress(steps, 0) as tell, _processes() as pool:
-        _each(pool, ahead.compile_piece, tuple(ahead.PIECES), tell)
-        _each(pool, compile_case, cases.names(), tell)
+    watch.resumable("What is compiled is kept; the same command continues.")
+    kernels = [(f"kernels of {name}", compile_kernels, name) for name in cases.names()]
+    largest, *others = ((name, ahead.compile_piece, name) for name in ahead.PIECES)
+    runs = [(name, compile_case, name) for name in cases.names()]
+    with voice.progress(len(ahead.PIECES) + 2 * len(runs), 0) as tell, _processes() as pool:
+        _each(pool, (largest, *kernels, *others), tell)
+        _each(pool, runs, tell)
     if not voice.silent():
         click.echo(f"Compiled in {time.perf_counter() - began:.0f} s; kept in {code_store.base()}.")
     return 0
@@ -35,11 +46,9 @@ def _processes() -> ProcessPoolExecutor:
     return ProcessPoolExecutor(ahead.processors(), get_context("spawn"), initializer=silence)
 
 
-def _each(
-    pool: ProcessPoolExecutor, work: Callable[[str], None], names: Sequence[str], tell: Callable[[str], None]
-) -> None:
-    """Do the work on each name, and say what is done, or every few seconds what is not."""
-    found = {pool.submit(work, name): name for name in names}
+def _each(pool: Executor, tasks: Sequence[Task], tell: Callable[[str], None]) -> None:
+    """Do all tasks, and say what is done, or every few seconds what is not."""
+    found = {pool.submit(work, name): told for told, work, name in tasks}
     left = set(found)
     while left:
         ended, left = wait(left, EVERY_S, FIRST_COMPLETED)
@@ -49,11 +58,20 @@ def _each(
             voice.note(f"{found[done]} is compiled")
         if not ended:
             first = [name for one, name in found.items() if one in left][: ahead.processors()]
-            voice.note(f"compiling {', '.join(first)}; {len(left)} of {len(names)} to go")
+            voice.note(f"compiling {', '.join(first)}; {len(left)} of {len(tasks)} to go")
+
+
+def compile_kernels(name: str) -> None:
+    """Compile the kernels of a case, in all its variants."""
+    from crossbody.engines.equations import known, system_of  # numba, which the other commands do without
+
+    for variant in cases.variants(name):
+        if known(case := cases.load(name, variant)):
+            system_of(case)
 
 
 def compile_case(name: str) -> None:
-    """Compile the kernels of a case, in all its variants."""
+    """Compile what else the runs of a case ask for, in all its variants."""
     for variant in cases.variants(name):
         engines.load("reference").prepare(cases.load(name, variant), "compiled").run()
 

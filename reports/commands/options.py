@@ -118,18 +118,30 @@ def settings_of(context: click.Context, _parameter: click.Parameter, begun: str)
     return [CompletionItem(name) for name in found if name.startswith(begun)]
 
 
-class _Positive(click.FloatRange):
-    """A range in which NaN is no number."""
+class Whole(click.IntRange):
+    """A range of whole numbers, which is told where something else is given."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read a number."""
-        found = super().convert(value, param, ctx)
-        if math.isnan(found):
-            self.fail(f"{value} is not a number.", param, ctx)
-        return found
+        try:
+            int(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a whole number in the range {self._describe_range()}.", param, ctx)
+        return super().convert(value, param, ctx)
 
 
-ABOVE_0 = _Positive(0.0, min_open=True)
+class Number(click.FloatRange):
+    """A range, which is told where something else is given; NaN is no number."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read a number."""
+        with suppress(ValueError):
+            if not math.isnan(float(value)):
+                return super().convert(value, param, ctx)
+        self.fail(f"{value!r} is not a number in the range {self._describe_range()}.", param, ctx)
+
+
+ABOVE_0 = Number(0.0, min_open=True)
 
 
 def time_limit(text: str, seconds: float = 3660.0) -> Callable[[_Work], _Work]:
@@ -177,7 +189,7 @@ others = click.option(
 reader_limit = time_limit("Terminate a reader that has not returned after this time, s.", 20.0)
 engine_limit = time_limit("Terminate an engine that has not finished a case after this time, s, with compilation.")
 memory = click.option(
-    "--memory", type=click.IntRange(1), default=1000, show_default=True, metavar="MB",
+    "--memory", type=Whole(1), default=1000, show_default=True, metavar="MB",
     help="Memory for reading LOG, beyond its size; a file that decompresses to more is refused.",
 )  # fmt: skip
 

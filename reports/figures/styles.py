@@ -38,7 +38,11 @@ def style(trace: Trace, i: int) -> dict[str, Any]:
     """
     if label(trace) == TRUTH:
         return {"color": "#888888", "dash": "solid", "width": 4, "strokes": "none"}
-    i = trace.about.get("place", i)
+    return look(trace.about.get("place", i))
+
+
+def look(i: int) -> dict[str, Any]:
+    """Colour, dash and width of the engine at place i."""
     dash = DASHES[(i + 2 * (i // len(COLOURS))) % len(DASHES)]  # like colours come with other dashes
     return {"color": COLOURS[i % len(COLOURS)], "dash": dash, "width": 1.8, "strokes": STROKES[dash]}
 
@@ -58,6 +62,13 @@ def coded(array: Floats | NDArray[np.float32]) -> dict[str, str]:
     text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
     shape = {"shape": ",".join(map(str, array.shape))} if array.ndim > 1 else {}
     return {"dtype": f"f{array.itemsize}", "bdata": text} | shape
+
+
+def level(axis: str, value: float, name: str) -> dict[str, Any]:
+    """A line across the plot of a y axis, and what it is, which the page writes over all lines."""
+    ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
+    line = {"color": LEVEL, "width": 1.2, "dash": "dash"}
+    return {"type": "line", "layer": "above", "line": line, "name": name} | ends
 
 
 class Panels:

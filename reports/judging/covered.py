@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.files.case import rubbing
-from crossbody.cases.files.contacts import Meeting, meeting
 from crossbody.reference import ahead
 from crossbody.reports.judging.reach import COARSE, motion
+
+if TYPE_CHECKING:
+    from crossbody.cases.files.contacts import Meeting
 
 LOOSE = 100.0
 """Tolerance of a second run, in units of that of the first, which tells how far their motion is known."""
@@ -41,6 +45,8 @@ def covered(case: Case, budget: float) -> Case:
 
 def _met(case: Case, rtol: float, budget: float) -> Meeting | None:
     """Return where shapes meet that have no row: at the start, or else on the motion at a tolerance."""
+    from crossbody.cases.files.contacts import meeting  # which cases that are no file do without
+
     if (first := meeting(case, np.zeros(1), case.q0[None], case.v0[None])) is not None:
         return first
     run = motion(case, rtol, time_limit=budget)

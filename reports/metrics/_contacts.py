@@ -6,31 +6,25 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED, Contact, contacts, rates
 from crossbody.reports.measuring.alignment import aligned, matched
-from crossbody.reports.measuring.equations import SAMPLES, equations, finite, spread
+from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import guard, turned
 from crossbody.reports.measuring.impulse import away
 from crossbody.reports.measuring.instants import off
 from crossbody.reports.measuring.truth import Truth
-from crossbody.reports.metrics.position import scale_of
+from crossbody.reports.metrics.position import ROUNDING, gap_scale_of
 
 UNITS = {
     "constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m",
     "slip_times": "s", "stick_times": "s",
 }  # fmt: skip
 NEEDS: dict[str, str] = {}
-ROUNDING = 1e-6
-"""Part of the largest coordinate: gaps that never open beyond it are known to its tolerance alone,
-and on those below it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
 KNOWN = 1e-6
 """Part of the largest to which limits hold gaps and what releases leave of multipliers."""
-FEW = 20
-"""Samples at which it is asked by how much gaps change with positions."""
 SHALLOW = 1e-12
 """Penetration below this part of the largest gap is rounding: collisions that take no time do not penetrate."""
 
@@ -81,24 +75,6 @@ def _let_go(truth: Truth, a: Contact, b: Contact) -> float:
     return off(truth, a.release, b.release, *_of_row(truth, "lam", a.row, CLOSED))
 
 
-def _widths(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:
-    """Return what the gap of each row is measured by, m or rad: its largest, or how far its bodies are.
-
-    A gap is known no better than the positions of which it is a function, by as much as it changes with each; but where
-    the equations are not known, or discrete variables change them, than the widest of all.
-    """
-    motion, system = truth.trajectory, equations(case)
-    own: Floats = np.max(np.abs(motion.gap[:, rows]), axis=0, initial=0.0)
-    widest = max(float(own.max()), ROUNDING * float(np.max(np.abs(motion.q), initial=0.0)))
-    if system is None or system.jumps:
-        return np.full(own.shape, widest)
-    some = spread(motion)[:: -(-SAMPLES // FEW)]
-    slopes = np.abs(system.equations_along(motion.t[some], motion.q[some], motion.v[some])[2][:, rows])
-    sizes = np.delete(scale_of(motion, case), [at + 3 for at in case.quaternions])
-    known: Floats = np.max(slopes * sizes, axis=(0, 2))
-    return np.maximum(own, np.minimum(known, widest))
-
-
 def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Gaps against the truth's on matched arcs, over the largest of each row.
 
@@ -112,7 +88,7 @@ def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     smooth = away(exact, [switch.t for switch in truth.trajectory.switches if not switch.smooth], case.t_end)
     apart = np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], axis=0, initial=0.0)
-    scale = _widths(truth, case, rows)
+    scale = gap_scale_of(truth, case, rows)
     return float(np.max(apart / np.where(scale > 0.0, scale, 1.0)))
 
 

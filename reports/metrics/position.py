@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
@@ -14,6 +15,11 @@ from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False
+ROUNDING = 1e-6
+"""Part of the largest coordinate: gaps that never open beyond it are known to its tolerance alone,
+and on those below it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
+FEW = 20
+"""Samples at which it is asked by how much gaps change with positions."""
 SMALL, STILL = 1e-6, 1e-9  # a coordinate that moves less than this part of its like rests
 
 
@@ -73,3 +79,23 @@ def _of_joints(own: Floats, case: Case, scene: Scene) -> Floats:
     for at in np.cumsum([0, *widths[:-1]])[[joint.type == "free" for joint in scene.joints]]:
         shared[at : at + 3] = own[at : at + 3].max()
     return np.maximum(own, shared)
+
+
+def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:
+    """Return what the gap of each row is measured by, m or rad: its largest, or how far its bodies are.
+
+    A gap is known no better than the positions of which it is a function, by as much as it changes with each; but where
+    the equations are not known, or discrete variables change them, than the widest of all.
+    """
+    from crossbody.reports.measuring.equations import SAMPLES, equations, spread  # numba, which a page does without
+
+    motion, system = truth.trajectory, equations(case)
+    own: Floats = np.max(np.abs(motion.gap[:, rows]), axis=0, initial=0.0)
+    widest = max(float(own.max()), ROUNDING * float(np.max(np.abs(motion.q), initial=0.0)))
+    if system is None or system.jumps:
+        return np.full(own.shape, widest)
+    some = spread(motion)[:: -(-SAMPLES // FEW)]
+    slopes = np.abs(system.equations_along(motion.t[some], motion.q[some], motion.v[some])[2][:, rows])
+    sizes = np.delete(scale_of(motion, case), [at + 3 for at in case.quaternions])
+    known: Floats = np.max(slopes * sizes, axis=(0, 2))
+    return np.maximum(own, np.minimum(known, widest))

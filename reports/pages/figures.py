@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,11 +45,12 @@ NONE: Limits = {}
 
 
 def limits_of(rows: Iterable[Row]) -> Limits:
-    """Return the limits by which engines are judged; those of few are called by whose they are."""
+    """Return what engines may reach, a limit beyond what is claimed; those of few are called by whose they are."""
     found: dict[str, dict[float, list[str]]] = {}
     for row in rows:
         if (row["limit"] or 0.0) > 0.0:
-            found.setdefault(row["metric"], {}).setdefault(row["limit"], []).append(f"{row['engine']}:{row['profile']}")
+            reach = row["limit"] + (0.0 if row["expected"] is None or isnan(row["expected"]) else row["expected"])
+            found.setdefault(row["metric"], {}).setdefault(reach, []).append(f"{row['engine']}:{row['profile']}")
     told: dict[str, dict[float, str]] = {}
     for metric, limits in found.items():
         usual = max(limits, key=lambda limit: len(limits[limit]))
@@ -161,6 +163,7 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE,
         if k < len(scales) and k not in turns:
             for limit, name in limits.get("position", {}).items():
                 sheet.limit(2 * place + 1, limit * scales[k], name)
+                sheet.band(2 * place, limit * scales[k], name)
             _show_still(sheet, 2 * place, np.concatenate([trace.run.q[:, k] for trace in traces]), least * scales[k])
     sheet.logarithmic(*range(1, len(rows), 2))
     return sheet.done()
@@ -185,6 +188,7 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
     total = float(np.nanmax(np.abs(summed[0]), initial=idle(traces[0].run) * float(traces[0].run.t[-1])))
     floor = floor_of(np.array([total]))
+    largest = max(float(np.nanmax(np.abs(traces[0].run.lam), initial=0.0)), idle(traces[0].run))
     true = [_true_impulse(trace, traces[0]) for trace in traces]
     for place, k in enumerate(shown):
         for i, trace in enumerate(traces):
@@ -201,6 +205,9 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
                 sheet.beyond(who, size, force_unit(traces, k), contacts[k])
         for limit, name in limits.get("lam_impulse_path", {}).items():
             sheet.limit(3 * place + 2, limit * total, name)
+            sheet.band(3 * place + 1, limit * total, name)
+        for limit, name in limits.get("lam_error", {}).items():
+            sheet.band(3 * place, limit * largest, name)
     sheet.logarithmic(*range(2, len(rows), 3))
     return sheet.done()
 
@@ -265,6 +272,8 @@ def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
     sheet.logarithmic(2)
     for limit, name in limits.get("energy_integrator", {}).items():
         sheet.limit(2, limit * energy_of(traces[0].run), name)
+    for limit, name in limits.get("energy_drift", {}).items():
+        sheet.band(0, limit * energy_of(traces[0].run), name)
     return sheet.done()
 
 
@@ -284,9 +293,29 @@ def penetration(
     for row, (k, on) in enumerate(zip(shown, always, strict=True)):
         for i, trace in enumerate(traces):
             depth = _depth(trace.run.gap[:, k], on)
-            sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, np.nan))
+            above = np.where(np.isnan(depth), np.nan, np.nan if on else 0.0)  # none is seen on a logarithmic axis
+            sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, above))
+        if contacts[k] not in turn:
+            for limit, name in limits.get("constraint_drift" if on else "penetration", {}).items():
+                sheet.limit(row, limit, name)
+        for half, name in () if on else _gaps(traces[0], k, limits):
+            sheet.band(row, half, name)
     sheet.logarithmic(*(row for row, on in enumerate(always) if on))
     return sheet.done()
+
+
+def _gaps(truth: Trace, k: int, limits: Limits) -> Iterator[tuple[float, str]]:
+    """How far the gap of a contact that can open may be from the truth's, and below the surface its depth."""
+    widths = {"gap_error": truth.about.get("gap_scales", ()), "penetration_error": _deepest(truth)}
+    for metric, width in widths.items():
+        for limit, name in limits.get(metric, {}).items() if k < len(width) else ():
+            yield limit * width[k], name
+
+
+def _deepest(truth: Trace) -> Sequence[float]:
+    """What depths are measured by, of every contact, m."""
+    rows = ~_always([truth])
+    return [float(np.max(-truth.run.gap[:, rows], initial=0.0))] * len(rows)
 
 
 def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:

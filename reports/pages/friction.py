@@ -171,7 +171,9 @@ def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dic
     x, y = points
     near = np.searchsorted(trace.run.t, [event.t for event in trace.run.events])[: most // 4]
     at = np.unique(np.r_[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1])
-    at, look = at[(at >= 0) & (at < len(x))], style(trace, i)
+    free = ~np.isfinite(x + y)
+    at = np.r_[at, np.flatnonzero(free[1:] & ~free[:-1]) + 1]  # a line ends where a contact opens
+    at, look = np.unique(at[(at >= 0) & (at < len(x))]), style(trace, i)
     return {
         "type": "scatter", "mode": "lines+markers", "marker": {"size": 4},
         "x": coded(x[at].astype(np.float32)), "y": coded(y[at].astype(np.float32)),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import beyond, runs_of, share
+from crossbody.reports.judging.told import WRONG, beyond, runs_of, share
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
 from crossbody.reports.pages.html import number
@@ -18,6 +18,8 @@ WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHI
 """Judged verdicts, the worst first."""
 RANKED = (*WORST[:-1], Word.INFO.value, Word.WITHIN.value)
 """Words of runs, the worst first: one that is not judged is beyond some limit for a known cause."""
+FARTHEST, NEAREST = 12, 6
+"""Decades that are told apart beyond a limit, and within it."""
 SHARES = tuple(part_of("position", part) for part in PARTS)
 """Parts of the worst error of position: they stand in the table of a case although nothing judges them."""
 KEY = (
@@ -43,7 +45,7 @@ class Cell:
         word: verdict, "plain" for a number that is not judged; empty where there is nothing.
         text, small: shown, and below it.
         page, anchor: where it leads: the verdicts of a page, "engine" or "engine~metric".
-        heat: decades from a limit, 0 (nearest) to 6; -1 where there is none.
+        heat: decades beyond a limit, 0 to FARTHEST, or from a millionth of it up; -1 where there is none.
     """
 
     title: str
@@ -131,12 +133,15 @@ def held(row: Row) -> bool:
 
 
 def heat_of(row: Row) -> int:
-    """How many decades a number is from its limit, as a step of its colour; within, less is more."""
-    if not held(row):
-        return -1
+    """How many decades a number is beyond its limit, as a step of its colour; within, beyond a millionth of it."""
     times = share(row)
+    known = row["verdict"] in (Word.WITHIN, *WRONG) or times < math.inf
+    if not held(row) or not known or (row["verdict"] != Word.WITHIN and not row["limit"]):
+        return -1  # nothing is a number of times what must be exact, and what has no number is none
     decades = math.log10(times) if 0.0 < times < math.inf else -math.inf if times == 0.0 else math.inf
-    return int(min(max(decades + 6.0 if row["verdict"] == Word.WITHIN else decades, 0.0), 6.0))
+    if row["verdict"] == Word.WITHIN:
+        return int(min(max(decades + NEAREST, 0.0), NEAREST))
+    return int(min(max(decades, 0.0), FARTHEST))
 
 
 def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, float]) -> list[Line]:

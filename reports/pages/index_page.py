@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reports.figures.section import Kind, Section, Table, columns
+from crossbody.reports.figures.styles import look
 from crossbody.reports.judging.told import WRONG, runs_of, sentence, share
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
@@ -92,6 +93,7 @@ def index_pages(found: Results) -> list[Page]:
             title=_title(found) if i == 0 else f"Cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
             lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
             word=grid.verdict(found.verdicts),
+            engines=[{"name": who, **look(place)} for who, place in found.places.items()],
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +21,8 @@ RUNS = (
     "lines over ladders of tolerances and steps, run crossbody bench, then crossbody report --with."
 )
 ALL = (
-    "Every engine on every case, each at its own setting; lower left is better. Click a name "
-    "in the legend to hide that engine, double-click to show it alone."
+    "Every engine on every case, each at its own setting; lower left is better. An engine's name stands "
+    "beside its largest error; the buttons above hide engines."
 )
 LADDERS = (
     "One line for each engine, with a point for every tolerance or step; lower left is better. "
@@ -65,7 +64,10 @@ def overview(found: Results) -> list[Section]:
 
 
 def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapping[str, int]) -> Figure:
-    """One mark a case, a colour and a symbol an engine: error of position (relative), run time in ms."""
+    """One mark a case, a colour and a symbol an engine: error of position (relative), run time in ms.
+
+    Marks of an engine are in the order of their errors: the page writes its name beside the last.
+    """
     data = [
         {
             "type": "scatter", "mode": "markers", "x": [error for _, error, _ in mine],
@@ -74,12 +76,13 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapp
             "hovertemplate": "%{text}<br>error %{x:.2g}, %{y:.3g} ms<extra>" + plain(who) + "</extra>",
             "marker": _mark(places[who]) | {"size": 9, "opacity": 0.8},
         }
-        for who, mine in sorted(points.items(), key=lambda one: places[one[0]])
+        for who, given in sorted(points.items(), key=lambda one: places[one[0]])
+        for mine in (sorted(given, key=lambda one: one[1]),)
     ]  # fmt: skip
     every = [one for mine in points.values() for one in mine]
     layout = {
         "title": {"text": "Run time against error of position, one mark for each case"}, "height": 460,
-        "showlegend": True,
+        "showlegend": True, "meta": "marks",
         "xaxis": _decades("relative error of position", [error for _, error, _ in every]),
         "yaxis": _decades("run time [ms]", [ms for *_, ms in every]),
     }  # fmt: skip
@@ -101,17 +104,6 @@ def _mark(place: int) -> dict[str, str]:
     return {"color": COLOURS[place % len(COLOURS)], "symbol": SYMBOLS[place % len(SYMBOLS)]}
 
 
-def _sides(heights: Sequence[float]) -> list[str]:
-    """Where a name stands beside a mark of some height: of marks of about one height above, at or below it."""
-    order = sorted(range(len(heights)), key=lambda i: heights[i])
-    logs = [math.log10(max(heights[i], FLOOR)) for i in order]
-    close = 0.05 * (max(logs, default=0.0) - min(logs, default=0.0) + 1.0)
-    near = [False, *(b - a < close for a, b in pairwise(logs)), False]
-    sides = {(False, True): "bottom", (True, False): "top"}
-    found = {i: sides.get((below, above), "middle") for i, (below, above) in zip(order, pairwise(near), strict=True)}
-    return [found[i] for i in range(len(heights))]
-
-
 def _limits(rows: Sequence[Row]) -> list[float]:
     """Return the limits on the error of position."""
     return sorted({row["limit"] for row in rows if row["metric"] == "position" and (row["limit"] or 0.0) > 0.0})
@@ -125,19 +117,17 @@ def scatter(
     edge = 10.0 * max([*finite, FLOOR])
     data = [
         {
-            "type": "scatter", "mode": "markers+text",
+            "type": "scatter", "mode": "markers",
             "x": [max(error, FLOOR) if math.isfinite(error) else edge], "y": [ms],
-            "name": plain(who), "meta": who, "text": [plain(who)],
-            # names stand inside the plot
-            "textposition": f"{side} left" if not math.isfinite(error) or error > 1e-4 * edge else f"{side} right",
-            "textfont": {"size": 11}, "cliponaxis": False,
+            "name": plain(who), "meta": who, "cliponaxis": False,
             "marker": _mark(places[who]) | {"size": 10} | ({} if math.isfinite(error) else {"symbol": "x"}),
         }
-        for (who, error, ms), side in zip(points, _sides([ms for *_, ms in points]), strict=True)
+        for who, error, ms in points
     ]  # fmt: skip
     told = f". Dashed: {'limits' if len(limits) > 1 else 'limit'} of the error" if limits else ""
     layout = {
         "title": {"text": f"Run time against error of position{told}"}, "height": 420, "showlegend": False,
+        "meta": "marks",
         "shapes": [
             {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in limits
         ],

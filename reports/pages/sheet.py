@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import LEVEL, coded, label, number, plain, style
+from crossbody.reports.figures.styles import coded, label, level, number, plain, style
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep
@@ -25,6 +25,7 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 """Above and below the plots of a figure, a plot, one of sixteen decades, between plots of one
 group, between groups (with times), pixels."""
 NAME = 12  # height of the name of a line beside its plot, pixels
+SEEN = 6  # height of a band that is seen around the truth, pixels
 DIGITS = 12  # of the mantissa of a value on a logarithmic axis, bits: four decimal ones
 MODE_COLOURS = {
     Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
@@ -52,10 +53,15 @@ class Sheet:
         self.ranges: dict[int, tuple[float, float]] = {}
         self.far: dict[str, list[tuple[float, str, str]]] = {}
         self.limits: list[tuple[int, float, str]] = []
+        self.bands: list[tuple[int, float, str]] = []
 
     def limit(self, row: int, value: float, name: str) -> None:
         """Draw what a plot's lines may reach and be within."""
         self.limits.append((row, value, name))
+
+    def band(self, row: int, half: float, name: str) -> None:
+        """Draw how far a plot's lines may be from the truth's, where that is wider than its line."""
+        self.bands.append((row, half, name))
 
     def logarithmic(self, *rows: int) -> None:
         """Make the y axes of these plots (from 0 on) logarithmic."""
@@ -91,21 +97,34 @@ class Sheet:
         """The figure."""
         drawn = sorted({row for row, *_ in self.lines})
         axes, height = self._axes(drawn)
+        bands = self._seen()
         place = {row: number(i + 1) for i, row in enumerate(drawn)}
         data = [
             line
             | {"y": coded(_short(y) if row in self.decades else y)}
             | {"xaxis": f"x{place[row]}", "yaxis": f"y{place[row]}"}
+            | ({"band": [half for half, _ in bands[row]]} if row in bands and line["meta"] == TRUTH else {})
             for row, y, line in self.lines
         ]
-        layout = {"title": {"text": self._caption(drawn)}, "height": height, "showlegend": False} | axes
+        layout = {"title": {"text": self._caption(drawn, bands)}, "height": height, "showlegend": False} | axes
         limits = [(f"y{place[row]}", value, name) for row, value, name in self.limits if row in place]
-        return {"data": data, "layout": layout | {"shapes": [_level(*one) for one in limits]}}
+        return {"data": data, "layout": layout | {"shapes": [level(*one) for one in limits]}}
 
-    def _caption(self, drawn: Sequence[int]) -> str:
+    def _seen(self) -> dict[int, list[tuple[float, str]]]:
+        """Half widths and names of the bands that are wider than the line that they are around."""
+        found: dict[int, list[tuple[float, str]]] = {}
+        for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
+            seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
+            if 2.0 * half * PLOT > SEEN * np.ptp(seen):
+                found.setdefault(row, []).append((half, name))
+        return found
+
+    def _caption(self, drawn: Sequence[int], bands: Mapping[int, Sequence[tuple[float, str]]]) -> str:
         empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
         told = [f"Empty and left out: {', '.join(empty)}"] if empty else []
         told += [f"Off scale: {off_scale(self.far)}"] if self.far else []
+        names = dict.fromkeys(name for each in bands.values() for _, name in each)
+        told += [f"Grey around the truth: {', '.join(names)}"] if names else []
         return ". ".join([self.title, *told])
 
     def _axes(self, drawn: Sequence[int]) -> tuple[dict[str, Any], int]:
@@ -145,13 +164,6 @@ def off_scale(far: Mapping[str, Sequence[tuple[float, str, str]]]) -> str:
         f"{who} up to {size:.3g} {unit} ({where}{f' and {more} more' if more else ''})"
         for who, size, unit, where, more in told
     )
-
-
-def _level(axis: str, value: float, name: str) -> dict[str, Any]:
-    """A line across a plot, and what it is, which the page writes over all lines."""
-    ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
-    line = {"color": LEVEL, "width": 1.2, "dash": "dash"}
-    return {"type": "line", "layer": "above", "line": line, "name": name} | ends
 
 
 def _lines(name: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,12 @@ import pandas as pd
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES, coded, number, plain
+from crossbody.reports.figures.styles import COLOURS, DASHES, coded, level, number, plain
 
 GREY = "#888888"
 SIGNED = [[0.0, COLOURS[0]], [0.5, "#f4f4f4"], [1.0, COLOURS[3]]]
 """Colours from -1 over 0 to 1."""
+NONE: Mapping[str, float] = {}
 SIGMAS = 2.0  # half of the noise band, standard deviations
 
 
@@ -36,8 +37,13 @@ def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()
                    _shades(rows, held, len(channels)))  # fmt: skip
 
 
-def residual(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:
-    """Measured less predicted over time beside the noise's band, a plot a channel, a line an engine."""
+def residual(
+    rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = (), limits: Mapping[str, float] = NONE
+) -> Figure:
+    """Measured less predicted over time beside the noise's band, a plot a channel, a line an engine.
+
+    Limits are the largest that is within, by channel.
+    """
     channels = _channels(rows)
     data, shapes = [], list(_shades(rows, held, len(channels)))
     for place, (channel, _) in enumerate(channels, start=1):
@@ -46,6 +52,7 @@ def residual(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = 
             data.append(_line(t, left, str(who), place, i))
         half = SIGMAS * noise.get(channel, np.nan)
         shapes += [_rectangle(place, y=(-half, half))] if np.isfinite(half) else []
+        shapes += [level(f"y{number(place)}", side * limits[channel], "limit") for side in (-1, 1) if channel in limits]
     return _figure(
         "Measured less predicted", data, [f"{name}\n[{unit}]" for name, unit in channels], "time [s]", shapes
     )
@@ -63,9 +70,11 @@ def correlation(rows: pd.DataFrame) -> Figure:
         band = float(chosen["band"].iloc[0])
         shapes.append(_rectangle(place, y=(-band, band)))
     names = [f"{channel} with\n{given or 'itself'}" for channel, given in kinds]
-    return _figure(
+    made = _figure(
         "Correlation of the residuals; 99 % band in grey", data, names, "lag [averages of residuals]", shapes
     )
+    made["layout"]["meta"] = "ends"  # where the page names lines
+    return made
 
 
 def profile(rows: pd.DataFrame, estimates: pd.DataFrame) -> Figure:
@@ -130,7 +139,7 @@ def _line(x: Floats, y: Floats, name: str, place: int, i: int = 0) -> dict[str, 
         "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)),
         "name": plain(name), "legendgroup": plain(name), "showlegend": place == 1, "line": look,
         "xaxis": f"x{axis}", "yaxis": f"y{axis}",
-    }  # fmt: skip
+    } | ({"meta": name} if i else {})  # fmt: skip
 
 
 def _band(t: Floats, y: Floats, noise: float, place: int) -> Iterator[dict[str, Any]]:

@@ -22,7 +22,7 @@ from crossbody.reports.judging.comparison import Entry, judged
 from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import TRUTH, Truth
-from crossbody.reports.metrics.position import scale_of
+from crossbody.reports.metrics.position import gap_scale_of, scale_of
 from crossbody.reports.runs import files, watch
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, as_plain, save
@@ -177,8 +177,18 @@ def traces(result: CaseResult) -> list[Trace]:
     case, truth = result.case, result.truth
     about = _about(case, TRUTH, "") | {"tier": truth.tier.value, "source": truth.source}
     about["scales"] = scale_of(truth.trajectory, case).tolist()
+    about["gap_scales"] = _gap_scales(truth, case)
     found = [Trace(about=about, run=truth.trajectory)]
     return found + [_trace(case, entry, truth) for entry in result.entries if entry.run is not None]
+
+
+def _gap_scales(truth: Truth, case: Case) -> list[float]:
+    """What the gap of every row that can open is measured by, m or rad; 0 of the others."""
+    rows = case.law.unilateral
+    found = np.zeros(len(rows))
+    if rows.any():
+        found[rows] = gap_scale_of(truth, case, rows)
+    return [float(scale) for scale in found]
 
 
 def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -65,7 +66,11 @@ def sections(out: Path) -> tuple[Section, ...]:
     plots = []
     if len(left):
         seen = {"replay-motion": figure.motion} if "measured" in left else {}
-        for name, draw in (seen | {"replay-residual": figure.residual}).items():
+        limits = {
+            str(row["channel"]): float(row["limit"]) for row in records(metrics)
+            if row["metric"] == "largest" and row["limit"] is not None and row["limit"] > 0.0
+        }  # fmt: skip
+        for name, draw in (seen | {"replay-residual": partial(figure.residual, limits=limits)}).items():
             plots.append(Plot(name=name, figure=draw(left, noise, held), time=True))
     plots += [Plot(name="replay-correlation", figure=figure.correlation(correlated))] if len(correlated) else []
     origin = "SYNTHETIC, no measurement" if about["synthetic"] else "a measurement"

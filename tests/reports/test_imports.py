@@ -12,7 +12,8 @@ import pytest
 
 from crossbody.reports import entry
 
-HEAVY = ("mujoco", "pandas", "scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.sparse")
+READERS = ("crossbody.cases.files.mjcf", "crossbody.cases.files.urdf")  # of robot files
+HEAVY = ("mujoco", "pandas", "scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.sparse", *READERS)
 SCRIPT = f"""
 import sys
 from crossbody.reports.cli import main

@@ -140,6 +140,15 @@ def test_a_bound_of_an_angle_pushes_with_a_torque(tmp_path: Path) -> None:
     assert axis_titles(section.plots[0].figure) == ["lam [N m]"]
 
 
+def test_a_contact_above_its_surface_has_no_depth_and_its_line_goes_on(run: Trajectory) -> None:
+    """It ended in the air, as if the run had."""
+    (line,) = penetration([trace(run)])["data"]
+    depth = numbers(line["y"])
+    assert depth.max() > 0.0
+    assert depth.min() == 0.0
+    assert numbers(line["x"])[-1] == pytest.approx(run.t[-1])
+
+
 def axis_titles(drawn: Figure) -> list[str]:
     return [axis["title"]["text"] for key, axis in drawn["layout"].items() if key.startswith("yaxis")]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from crossbody.cases import Mode, load
 from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load as load_engine
 from crossbody.reports.measuring.friction import rubbing
-from crossbody.reports.pages.friction import friction, hysteresis
+from crossbody.reports.pages.friction import _line, friction, hysteresis
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.scenes.scene import slip
@@ -107,3 +108,15 @@ def test_without_friction_there_is_no_such_section() -> None:
     case = load("bouncing_ball", "linear")
     run = load_engine("reference").prepare(case, "compiled").run()
     assert friction([Trace(about=study._about(case, "reference", "compiled"), run=run)]) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_line_of_friction_ends_wherever_its_contact_opens(trace: Trace, seed: int) -> None:
+    """Between two samples that are drawn it was pressed throughout."""
+    rng = np.random.default_rng(seed)
+    n = 4000
+    pressed = np.repeat(rng.uniform(size=n // 4) > 0.1, 4)
+    x = np.where(pressed, np.arange(n, dtype=float), np.nan)
+    for a, b in pairwise(numbers(_line(trace, 0, (x, x), 100)["x"])):
+        if np.isfinite(a) and np.isfinite(b):
+            assert pressed[int(a) : int(b) + 1].all()

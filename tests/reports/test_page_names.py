@@ -8,15 +8,19 @@ from pathlib import Path
 
 import chromium
 import numpy as np
+import pandas as pd
 import pytest
 
 from crossbody.cases import load
+from crossbody.reports.figures.section import Figure, Plot, Section
 from crossbody.reports.judging.comparison import Entry
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.pages import site
+from crossbody.reports.pages import figures, html, precision, site
+from crossbody.reports.replay import figure as replays
 from crossbody.reports.runs import study
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.output import folder
+from crossbody.reports.runs.store import Trace
 
 pytestmark = [
     pytest.mark.browser,
@@ -173,3 +177,147 @@ def test_a_narrow_screen_has_names_below_the_title(page: Path, browser: chromium
     assert all(browser.js(hidden))
     assert browser.js("document.documentElement.scrollWidth <= innerWidth")
     assert browser.complaints() == []
+
+
+def drawn(folder: Path, figure: Figure, browser: chromium.Browser, width: int = 1400, time: bool = False) -> None:
+    """Open a page of one figure."""
+    section = Section(name="s", title="S", plots=(Plot(name="p", figure=figure, time=time),))
+    page = html.render([html.Page(name="p", title="P", sections=[section])], (), "")
+    for name, content in ({"p.html": page} | html.assets()).items():
+        (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    browser.open(folder / "p.html", width)
+    browser.wait("'drawn' in document.querySelector('.plot').dataset")
+
+
+TEXTS = "[...document.querySelectorAll('.names text:not(.limit)')].map((text) => text.textContent)"
+LEGEND = "document.querySelectorAll('.legend .traces').length"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_marks_of_an_engine_are_named_beside_the_last(seed: int, tmp_path: Path, browser: chromium.Browser) -> None:
+    rng = np.random.default_rng(seed)
+    engines = [f"engine {k}:profile" for k in range(12)]
+    points = {
+        who: [(f"case {i}", 10.0 ** rng.uniform(-12, 0), 10.0 ** rng.uniform(-1, 3)) for i in range(6)]
+        for who in engines
+    }
+    cloud = precision.cloud(points, {who: k for k, who in enumerate(engines)})
+    drawn(tmp_path, cloud, browser)
+    assert sorted(browser.js(TEXTS)) == sorted(engines)
+    assert browser.js(LEGEND) == 0
+    assert browser.js(OVERLAPS) == []
+    starts, axes = browser.js(
+        "(() => { const box = document.querySelector('.plot'), { xaxis: x, yaxis: y } = box._fullLayout;"
+        " const from = (d) => d.match(/M([-\\d.]+) ([-\\d.]+)/).slice(1).map(Number);"
+        " return [[...document.querySelectorAll('.names path')].map((one) => from(one.getAttribute('d'))),"
+        " box.data.map((one) => [x._offset + x.d2p(one.x.at(-1)), y._offset + y.d2p(one.y.at(-1))])]; })()"
+    )
+    assert np.allclose(sorted(starts), sorted(axes), atol=0.6)
+    assert all(line["x"] == sorted(line["x"]) for line in cloud["data"])
+    inside = (
+        "[...document.querySelectorAll('.names text')].every((text) => {"
+        " const [a, b] = [text, document.querySelector('.plot')].map((one) => one.getBoundingClientRect());"
+        " return a.left >= b.left && a.right <= b.right; })"
+    )
+    assert browser.js(inside)
+    drawn(tmp_path, precision.cloud(points, {who: k for k, who in enumerate(engines)}), browser, width=400)
+    assert (browser.js(TEXTS), browser.js(LEGEND)) == ([], len(engines))
+    assert browser.complaints() == []
+
+
+def test_lines_over_lags_are_named_at_their_ends(tmp_path: Path, browser: chromium.Browser) -> None:
+    rng = np.random.default_rng(0)
+    engines = ["reference:compiled", "mujoco:default", "pinocchio:law"]
+    rows = pd.DataFrame([
+        {"who": who, "channel": "th1", "input": given, "lag": lag, "value": rng.uniform(-1, 1), "band": 0.3}
+        for given in ("", "input 1") for who in engines for lag in range(20)
+    ])  # fmt: skip
+    drawn(tmp_path, replays.correlation(rows), browser)
+    assert sorted(browser.js(TEXTS)) == sorted(2 * engines)
+    assert browser.js(LEGEND) == 0
+    assert browser.js(OVERLAPS) == []
+    assert browser.complaints() == []
+
+
+def test_a_band_lies_around_the_truth_and_goes_with_it(tmp_path: Path, browser: chromium.Browser) -> None:
+    case = load("bouncing_ball", "linear")
+    run = truth_of(case).trajectory
+    about = {"coordinates": [{"name": "height", "unit": "m"}], "engine": "truth", "profile": "", "scales": [2.0]}
+    broken = replace(run, q=np.where((run.t > 1.0) & (run.t < 1.2), np.nan, run.q[:, 0])[:, None])
+    traces = [Trace(about=about, run=broken)]
+    drawn(tmp_path, figures.motion(traces, 500, {"position": {0.05: "limit"}}), browser, time=True)
+    line, band = browser.js("document.querySelector('.plot').data.map(({ x, y }) => [[...x], [...y]])")
+    known = np.isfinite(np.array(line[1], float))
+    edges = np.array([y for y in band[1] if y is not None])
+    assert known.any()
+    assert not known.all()
+    wanted = np.array(line[1], float)[known]
+    assert np.allclose(sorted(edges), sorted(np.r_[wanted + 0.1, wanted - 0.1]), atol=1e-6)
+    assert band[1].count(None) == 2
+    assert browser.js(TEXTS) == ["truth"]
+    hide = "crossbody.hidden.add('truth'); crossbody.tell('engines'); document.querySelector('.plot').data"
+    assert browser.js(f"{hide}.map(({{ visible }}) => visible)") == [False, False]
+    assert browser.complaints() == []
+
+
+@pytest.mark.parametrize("name", ["", "index.html"])
+def test_an_engine_that_is_hidden_leaves_every_table(name: str, page: Path, browser: chromium.Browser) -> None:
+    browser.open(page.with_name(name) if name else page)
+    rows = "[...document.querySelectorAll('.table tr')].filter((row) => row.textContent.includes('fake:p3'))"
+    assert browser.js(f"{rows}.length && {rows}.every((row) => !row.hidden)")
+    browser.js("document.querySelector('[data-show=\"fake:p3\"]').click()")
+    assert browser.js(f"{rows}.every((row) => row.hidden)")
+    assert browser.js("document.querySelectorAll('.table tr[data-engine]:not([hidden])').length") > 1
+    browser.js("document.querySelector('[data-show-all]').click()")
+    assert browser.js(f"{rows}.every((row) => !row.hidden)")
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_marks_that_are_near_have_names_apart(width: int, tmp_path: Path, browser: chromium.Browser) -> None:
+    engines = [f"engine:profile {k}" for k in range(6)]
+    marks = [(who, 1e-9 * (1.0 + 0.02 * k), 5.0 + 0.1 * k) for k, who in enumerate(engines)]
+    figure = precision.scatter(
+        [*marks, ("far:off", float("inf"), 5.0)], {who: k for k, who in enumerate([*engines, "far:off"])}
+    )
+    drawn(tmp_path, figure, browser, width)
+    assert sorted(browser.js(TEXTS)) == sorted([*engines, "far:off"])
+    assert browser.js(OVERLAPS) == []
+    assert browser.complaints() == []
+
+
+def test_one_instant_is_at_one_place_in_all_figures(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    browser.wait(DRAW)
+    ends = browser.js(
+        "[...document.querySelectorAll('.plot[data-time]')].map((box) => box._fullLayout.xaxis._offset"
+        " + box._fullLayout.xaxis._length)"
+    )
+    assert len(ends) >= 4
+    assert len(set(ends)) == 1
+
+
+def test_a_hidden_engine_leaves_the_figures_of_a_replay(tmp_path: Path, browser: chromium.Browser) -> None:
+    t = np.linspace(0.0, 1.0, 20)
+    rows = pd.concat([
+        pd.DataFrame({"who": who, "channel": "th1", "unit": "rad", "window": 0, "t": t, "measured": t, "value": t})
+        for who in ("reference:compiled", "mujoco:default")
+    ])  # fmt: skip
+    for draw in (replays.motion, replays.residual):
+        drawn(tmp_path, draw(rows, {"th1": 0.1}), browser, time=True)
+        hide = "crossbody.hidden.add('mujoco:default'); crossbody.tell('engines'); document.querySelector('.plot').data"
+        left = browser.js(f"{hide}.filter(({{ visible }}) => visible).map(({{ name }}) => name)")
+        assert "reference:compiled" in left
+        assert "mujoco:default" not in left
+
+
+def test_bars_to_measure_by_lie_over_nothing_on_a_narrow_screen(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page, width=400)
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    browser.wait("document.querySelector('[data-speed]').options.length > 0")
+    colours = browser.js(
+        "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {"
+        " const c = document.querySelector('.player canvas'), k = c.width / c.clientWidth;"
+        " const found = c.getContext('2d').getImageData(0.65 * c.width, c.height - 48 * k, 0.1 * c.width, 48 * k);"
+        " done(new Set(new Uint32Array(found.data.buffer)).size); })))"
+    )
+    assert colours == 1

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -235,6 +237,15 @@ def test_plug_ins_of_another_distribution_are_found_by_their_entry_points(
     monkeypatch.setenv("PYTHONPATH", str(pytester.path))
     done = run(pytester, "--crossbody-case", "their_case:right", *REFERENCE, "-k", "position or named")
     done.assert_outcomes(passed=2, deselected=10)
+
+
+def test_where_no_distribution_names_plug_ins_none_is_read() -> None:
+    code = (
+        "import sys; sys.modules.pop('importlib.metadata', None); from crossbody.cases import installed;"
+        " print(installed.modules('crossbody.cases'), 'importlib.metadata' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["{}", "False"]
 
 
 @pytest.mark.parametrize("by", ["option", "configuration"])

@@ -102,3 +102,14 @@ def test_correlations_of_residuals_stand_in_their_band(random: np.random.Generat
     drawn = figure.correlation(rows)
     assert spans(drawn["layout"]["shapes"], "y") == {"y": (-0.1, 0.1), "y2": (-0.2, 0.2)}
     np.testing.assert_allclose(numbers(drawn["data"][1]["y"]), rows["value"][5:], rtol=1e-6)
+
+
+def test_the_largest_residual_that_is_within_is_drawn_on_both_sides(random: np.random.Generator) -> None:
+    channels = ("th1", "th2", "th3")
+    rows = pd.concat([
+        pd.DataFrame({"who": "e:p", "channel": name, "unit": "rad", "window": 0, "t": np.arange(9.0),
+                      "measured": 0.0, "value": random.uniform(-1, 1, 9)}) for name in channels
+    ])  # fmt: skip
+    drawn = figure.residual(rows, {}, limits={"th1": 0.5, "th3": 0.25})
+    lines = [(one["yref"], one["y0"]) for one in drawn["layout"]["shapes"] if one.get("name") == "limit"]
+    assert sorted(lines) == [("y", -0.5), ("y", 0.5), ("y3", -0.25), ("y3", 0.25)]

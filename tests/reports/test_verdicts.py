@@ -318,6 +318,20 @@ def test_a_run_that_did_not_finish_is_outside_with_advice(case: Case, motion: Tr
     assert Outcome.DIVERGED.advice in rows["why"][0]
 
 
+@pytest.mark.parametrize(
+    "who", ["reference:compiled", "reference:cvode", "mujoco:matched", "pinocchio:law", "pinocchio:admm"]
+)
+def test_what_did_not_finish_tells_where_it_was_first_and_what_to_do_last(
+    who: str, case: Case, motion: Trajectory
+) -> None:
+    engine, profile = who.split(":")
+    run = engines.load(engine).prepare(load("bouncing_ball", "linear"), profile, max_steps=20).run()
+    failed = replace(motion, outcome=run.outcome, message=run.message)
+    told = compare(case, [Entry(engine="fake", profile="short", run=failed)])["why"][0]
+    assert told.startswith("step_limit: t = ")
+    assert told.endswith(Outcome.STEP_LIMIT.advice)
+
+
 def test_a_skipped_engine_is_a_row_with_its_sentence(case: Case) -> None:
     rows = compare(case, [Entry(engine="absent", profile="*", skipped="It is not installed.")])
     assert rows["verdict"][rows["engine"] == "absent"].tolist() == [Word.SKIPPED]

@@ -140,6 +140,9 @@ const crossbody = (() => {
   };
   crossbody.each(".matrix", columns);
   crossbody.on("engines", () => document.querySelectorAll(".matrix").forEach(columns));
+  const rows = (row) => { row.hidden = !crossbody.shown(row.dataset.engine.replace(/:$/, "")); };
+  crossbody.each("details.table tr[data-engine]", rows);
+  crossbody.on("engines", () => document.querySelectorAll("details.table tr[data-engine]").forEach(rows));
   crossbody.each("[data-show-all]", (button) => button.addEventListener("click", () => {
     crossbody.hidden.clear();
     crossbody.tell("engines");

@@ -6,6 +6,7 @@
   };
   const SHARP = 2; // device pixels a pixel at most; more cost time and are not seen in what moves
   const SAID = 100; // time between two readouts while it plays, ms: each has the page laid out and painted
+  const [NARROW, BARS] = [560, 48]; // width of a picture whose bars would lie over the scene, and their height, pixels
   const FAR = 4; // times its own size that a mechanism goes before it is followed
   const shortNumber = (x) => String(Number(x.toPrecision(3)));
 
@@ -262,7 +263,7 @@
       g.lineJoin = g.lineCap = "round";
       const shown = tracks.filter((track) => crossbody.shown(track.name));
       if (view.value === "ghosts") {
-        const to = camera(0, 0, box.width, box.height);
+        const to = camera(0, 0, box.width, box.height - (box.width < NARROW ? BARS : 0));
         still(to);
         shown.forEach((track, i) => paint(track, to, box.height, i > 0));
         bar(to, 12, box.height - 12, box.height);

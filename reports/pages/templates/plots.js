@@ -36,7 +36,8 @@
     }
     return out;
   };
-  // Lines over time are named at their ends, to the right of their plots; on a narrow screen, below the title.
+  // Lines over time, or over lags, are named at their ends, to the right of their plots, and marks of a cloud beside the
+  // last of each engine; on a narrow screen, below the title.
   const [NARROW, TALL, ROOM] = [560, 12, 12]; // width of such a screen, height of a name, width of what leads to it, pixels
   const STROKES = { dash: "7 4", dot: "2 3", dashdot: "7 3 2 3" };
   const SVG = Object.assign(document.createElement("div"), { innerHTML: "<svg></svg>" }).firstChild.namespaceURI;
@@ -46,17 +47,18 @@
     made.append(...inside);
     return made;
   };
-  const own = (line) => line.name && line.line && !line.fill && line.type !== "bar" && line.visible !== false;
+  const own = (line) => line.name && (line.line || line.mode === "markers") && !line.fill && line.type !== "bar" && line.visible !== false;
   const last = ({ x, y }, high = Infinity) => {
     let i = x.length - 1;
     while (i >= 0 && !(x[i] <= high && Number.isFinite(y[i]))) i -= 1;
     return i;
   };
+  const plainly = (line) => line.name.replaceAll("&lt;", "<");
   const entitle = (lines) => { // one that ends before the others says when
     const ends = lines.map((line) => line.x[last(line)]);
     const end = Math.max(...ends.filter(Number.isFinite));
     lines.forEach((line, i) => {
-      line.title = line.name.replaceAll("&lt;", "<") + (ends[i] < 0.99 * end ? ` until ${Number(ends[i].toPrecision(3))} s` : "");
+      line.title = plainly(line) + (ends[i] < 0.99 * end ? ` until ${Number(ends[i].toPrecision(3))} s` : "");
     });
   };
   const below = (box, lines) => {
@@ -75,34 +77,40 @@
   };
   const named = (box, { data, layout }) => {
     const lines = data.filter(own);
+    const timed = box.hasAttribute("data-time");
+    const [wide, pen] = [box.clientWidth >= NARROW, document.createElement("canvas").getContext("2d")];
+    pen.font = "11px system-ui, sans-serif";
+    const room = (text) => ROOM + Math.ceil(pen.measureText(text).width);
+    const beside = (texts) => { layout.margin = { ...layout.margin, r: Math.min(Math.max(...texts.map(room)) + 8, 0.4 * box.clientWidth) }; };
+    const engines = [...box.closest("[data-page]").querySelectorAll("[data-show]")].map((each) => `${each.dataset.show} until 0.555 s`);
+    if (timed && wide && engines.length) beside(engines); // one instant is at one place in all figures of a page
     if (!lines.length) return null;
-    if (!box.hasAttribute("data-time")) { // lines in a plane end anywhere, often on each other
-      const engines = lines.filter(({ meta }) => meta);
-      if (layout.showlegend === false && engines.length) below(box, engines);
+    if (!timed && !layout.meta) { // lines in a plane end anywhere, often on each other
+      const known = lines.filter(({ meta }) => meta);
+      if (layout.showlegend === false && known.length) below(box, known);
       return null;
     }
-    entitle(lines);
+    if (timed) entitle(lines);
+    else lines.forEach((line) => { line.title = plainly(line); });
     const over = drawing("svg", { class: "names", "aria-hidden": "true" });
-    if (box.clientWidth < NARROW) {
+    const marks = layout.meta === "marks";
+    if (!wide && !(marks && layout.showlegend === false)) {
       if (layout.showlegend === false) below(box, lines); // others have a legend
       return over;
     }
-    over.dataset.beside = "";
-    const pen = document.createElement("canvas").getContext("2d");
-    pen.font = "11px system-ui, sans-serif";
-    const wide = Math.max(...lines.map((line) => pen.measureText(line.title).width));
-    layout.margin = { ...layout.margin, r: Math.min(Math.ceil(wide) + ROOM + 8, 0.4 * box.clientWidth) };
-    lines.forEach((line) => { line.showlegend = false; });
+    over.dataset.named = layout.meta || "ends";
+    lines.forEach((line) => Object.assign(line, { showlegend: false, wide: room(line.title) }));
+    if (!marks && !(timed && engines.length)) beside(lines.map(({ title }) => title));
     return over;
   };
   // Where a line leaves its plot, pixels; nothing where it is not seen.
   const left = (line, x, y) => {
-    const [low, high] = x.range;
+    const [low, high] = x.type === "log" ? x.range.map((end) => 10 ** end) : x.range;
     const i = last(line, high);
     if (i < 0) return null;
     const to = (value) => Math.min(Math.max(y.d2p(value), 0), y._length);
     const [t, next] = [line.x[i], line.x[i + 1]];
-    if (next > high && Number.isFinite(line.y[i + 1])) {
+    if (line.mode !== "markers" && next > high && Number.isFinite(line.y[i + 1])) {
       return [x._length, to(line.y[i]) + (high - t) / (next - t) * (to(line.y[i + 1]) - to(line.y[i]))];
     }
     return t < low ? null : [x.d2p(t), to(line.y[i])];
@@ -131,21 +139,39 @@
       const right = x._offset + x._length;
       const limits = (all.shapes || []).filter(({ yref, name: text }) => text && yref === key).map((shape) => [shape.name, y.d2p(shape.y0)])
         .filter(([, at]) => at >= 0 && at <= y._length).sort(([, a], [, b]) => a - b);
-      spread(limits.map(([, at]) => at - TALL / 2), y._length).forEach((middle, k) => { // above the line
-        over.append(drawing("text", { class: "limit", x: right - 3, y: y._offset + middle + 3 }, limits[k][0]));
+      spread(limits.map(([, at]) => at + TALL / 2), y._length + TALL).forEach((middle, k) => { // above the line, also of the highest
+        over.append(drawing("text", { class: "limit", x: right - 3, y: y._offset + middle - TALL + 3 }, limits[k][0]));
       });
-      if (!("beside" in over.dataset)) continue;
+      if (!over.dataset.named) continue;
+      const inside = over.dataset.named === "marks";
       const lines = box.data.filter((line) => own(line) && (line.yaxis || "y") === key);
       const ends = lines.map((line) => [line, left(line, x, y)]).filter(([, at]) => at).sort(([, a], [, b]) => a[1] - b[1]);
       spread(ends.map(([, at]) => at[1]), y._length).forEach((middle, k) => {
-        const [{ title, line: { color } }, at] = ends[k];
-        const [there, height] = [right + ROOM, y._offset + middle];
-        const text = drawing("text", { x: there + 3, y: height + 4 }, title);
+        const [{ title, wide, line, marker }, at] = ends[k];
+        const { color } = line || marker;
+        const side = inside && at[0] + wide > x._length ? -1 : 1; // of a mark, what has room
+        const [there, height] = [inside ? x._offset + at[0] + side * ROOM : right + ROOM, y._offset + middle];
+        const text = drawing("text", { x: there + 3 * side, y: height + 4, "text-anchor": side < 0 ? "end" : "start" }, title);
+        if (inside) text.setAttribute("class", "inside");
         text.style.setProperty("--of", color);
         over.append(drawing("path", { d: `M${x._offset + at[0]} ${y._offset + at[1]}L${there} ${height}`, stroke: color }), text);
       });
     }
   };
+  // How far lines may be from one, around it: an outline a stretch without gaps.
+  const around = (line) => (line.band || []).map((half) => {
+    const [x, y] = [[], []];
+    const put = (at, side) => { x.push(line.x[at]); y.push(line.y[at] + side); };
+    for (let [from, i] = [0, 0]; i <= line.y.length; i += 1) {
+      if (Number.isFinite(line.y[i])) continue;
+      for (let k = from; k < i; k += 1) put(k, half);
+      for (let k = i - 1; k >= from; k -= 1) put(k, -half);
+      if (i > from) put(i, NaN);
+      from = i + 1;
+    }
+    const { meta, xaxis, yaxis } = line;
+    return { type: "scatter", mode: "lines", x, y, meta, xaxis, yaxis, line: { width: 0 }, fill: "toself", fillcolor: "rgba(136,136,136,.3)", hoverinfo: "skip" };
+  });
   const visible = (data) => data.map((trace) => (trace.meta && !crossbody.shown(trace.meta) ? false : true));
 
   let busy = false;
@@ -214,6 +240,7 @@
     narrow(box, figure);
     const mark = document.createElement("div");
     mark.className = "cursor";
+    figure.data.push(...figure.data.flatMap(around));
     const shown = visible(figure.data);
     figure.data.forEach((trace, i) => { trace.visible = shown[i]; });
     charts.set(box, { mark, over });

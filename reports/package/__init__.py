@@ -1,0 +1,1 @@
+"""The package crossbody itself, of which the five folders are the parts."""
