@@ -210,6 +210,7 @@ class Exudyn(Engine):
     hidden = HIDDEN
     versions: Mapping[str, str] = {"exudyn": version("exudyn")}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    steps: Mapping[str, float] = {"default": 0.5}
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Cases that are not of bodies on a line."""

@@ -77,6 +77,7 @@ class Pymunk(Engine):
     hidden = HIDDEN
     versions: Mapping[str, str] = {"pymunk": pymunk.version, "Chipmunk": pymunk.chipmunk_version}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    steps: Mapping[str, float] = dict.fromkeys(profiles, 0.0)  # bodies are moved before velocities change
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Cases that are not of bodies on a line in the plane x, z, and rows that are always on."""

@@ -1,0 +1,280 @@
+"""The first steps of engines that step in time, held against the law's: what a model holds, its steps apply.
+
+A known property of such an engine is as large as its step, and a parameter that is off by some per cent hides behind
+it. Of steps a thousandth as long nothing is left, and what they do is known in closed form. Where nothing touches,
+velocities change by v' dt, and theta of the change counts where a step moves bodies (`Engine.steps`). Where one pair
+meets at the speed w, it parts at e w; and where it slips fast besides, |p_t| = mu p_n with
+M (v - v of the same steps where nothing touches) = H_n^T p_n + H_t^T p_t.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crossbody import engines
+from crossbody.cases import Case, CrossbodyError, Trajectory
+from crossbody.cases import closed_forms as cf
+from crossbody.cases.arrays import Floats
+from crossbody.cases.rotations import normalised
+from crossbody.cases.scene_contacts import WAYS, Contact, contacts
+from crossbody.reports.judging.audit import AuditRow
+from crossbody.reports.measuring.equations import equations
+
+if TYPE_CHECKING:
+    from crossbody.reference import System
+
+PART, OF_BLOWS = 1e-3, 1e-5
+"""Parts of an engine's own step that are taken, where nothing touches and where a pair meets."""
+STEPS, BLOWS = 4, 8
+"""How many."""
+CLEAR = 1e-3
+"""Gap, m, of what does not touch: no motion of that time crosses it."""
+FAST, MEETS, SLIPS, FASTEST = 0.5, 1.0, 30.0, 100.0
+"""Velocities, SI, of what is free and at which a pair meets, how many times as fast it slips, and the fastest."""
+BEFORE = 2.75
+"""How many steps before a pair meets."""
+TOLERANCE, OF_PLACES = 2e-3, 0.02
+"""To which a force or a restitution is what it must be, and theta."""
+NEWTON, ROUNDED, NONE = 20, 1e-13, 1e-10
+"""Iterations that place bodies, m; and part of a momentum that is none."""
+SEED, USUAL = 20240917, 1e-3
+Rows = NDArray[np.intp]
+
+
+@dataclass
+class Probe:
+    """An engine under test, and the equations of its case.
+
+    Attributes:
+        case: without a controller, gates or coordinates of its own.
+        engine, profile: who steps.
+        used, asked: settings of its run, and those of them that were asked for.
+        theirs: the reference's audit, with gap(q), H(q) and M(q).
+        system: the reference's equations.
+        opening, held: rows that open, and those that are always on.
+    """
+
+    case: Case
+    engine: engines.Engine
+    profile: str
+    used: Mapping[str, Any]
+    asked: Mapping[str, Any]
+    theirs: Mapping[str, Any]
+    system: System
+    opening: Rows = field(init=False)
+    held: Rows = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Tell rows apart."""
+        own = (np.asarray(self.system.follows) < 0) & (np.asarray(self.system.friction_loss) == 0.0)
+        self.opening = np.flatnonzero(own & self.case.law.unilateral)
+        self.held = np.flatnonzero(own & ~self.case.law.unilateral)
+
+    @property
+    def dt(self) -> float:
+        """Its step, s, or what stands for it in one that has none."""
+        return float(self.used.get("dt", USUAL))
+
+    @property
+    def restitution(self) -> float:
+        """What pairs must part with; NaN where the engine has none, or rows have their own."""
+        law = self.case.law
+        kinds = np.unique(np.stack([law.a0, law.a1, law.b0, law.b1])[:, self.opening], axis=1).shape[1]
+        alike = kinds == 1 or "restitution" in self.asked
+        return float(self.used.get("restitution", np.nan)) if alike else np.nan
+
+    @property
+    def meets(self) -> float:
+        """Speed at which pairs meet, m/s: where no step hides it, impacts that are too slow are captured."""
+        if "dt" in self.used or not len(self.opening):
+            return MEETS
+        a0, a1 = float(self.case.law.a0[self.opening[0]]), float(self.case.law.a1[self.opening[0]])
+        slow = cf.threshold_speed(a0, a1, float(self.theirs.get("gravity", 0.0))) if a0 > 0.0 else math.inf
+        return max(MEETS, 2.0 * slow)
+
+    def ways(self, rows: Rows) -> Rows:
+        """Return the tangents of normal rows, two for each."""
+        return np.array([int(self.system.tangent[row]) + k for row in rows for k in range(len(WAYS))])
+
+    def placed(self, rows: Rows, gaps: Floats) -> Floats:
+        """Return positions near the start in which rows have some gaps: by Newton, in least change."""
+        q: Floats = np.array(self.case.q0)
+        for _ in range(NEWTON):
+            off = gaps - self.theirs["gap"](q)[rows]
+            if np.all(np.abs(off) <= ROUNDED):
+                break
+            q = q + self.system.displacement(q, np.linalg.lstsq(self.theirs["H"](q)[rows], off)[0])
+            q = normalised(q, self.case.quaternions)
+        return q
+
+    def stepped(self, q: Floats, v: Floats, part: float, count: int) -> Trajectory | None:
+        """Return some steps from a state; None where they fail."""
+        given = {**self.asked, **({"dt": part * self.dt} if "dt" in self.used else {})}
+        run = self.engine.prepare(self.begun(q, v, count * part * self.dt), self.profile, **given).run()
+        return run if run.outcome.ok else None
+
+    def begun(self, q: Floats, v: Floats, t_end: float) -> Case:
+        """Return the case from another state on, up to an instant, s."""
+        return replace(
+            self.case, q0=q, v0=v, t_end=t_end, closed_form=None, claims=(), chaos=None, consistent=False
+        )  # fmt: skip
+
+
+def first_steps(
+    case: Case, who: tuple[engines.Engine, str], used: Mapping[str, Any], asked: Mapping[str, Any],
+    audited: Sequence[AuditRow], theirs: Mapping[str, Any],
+) -> tuple[AuditRow, ...]:  # fmt: skip
+    """Return rows for the parity audit of an engine that steps in time, or has a restitution; none of another.
+
+    Args:
+        case: the scene.
+        who: engine and profile.
+        used: settings of its run.
+        asked: those of them that were asked for.
+        audited: rows of the audit so far: whose masses are known to be others accelerates otherwise.
+        theirs: the reference's audit.
+    """
+    system, theta = equations(case), who[0].steps.get(who[1])
+    if theta is None or system is None or "gap" not in theirs or not _plain(case):
+        return ()
+    probe = Probe(case, *who, used, asked, theirs, system)
+    same = all(row.ok for row in audited if row.quantity in ("M", "bias"))
+    try:
+        return (*(_free(probe) if same and "dt" in used and not math.isnan(theta) else ()), *_blows(probe))
+    except CrossbodyError:  # a state that the engine or the reference refuses
+        return ()
+
+
+def _plain(case: Case) -> bool:
+    """Whether bodies, joints, shapes and inputs are all that there is, so that a state says all."""
+    return not (case.file or case.form or case.gates or case.control)
+
+
+def _free(probe: Probe) -> Iterator[AuditRow]:
+    """Step where nothing touches and everything moves."""
+    gap, t_end = probe.theirs["gap"], PART * STEPS * probe.dt
+    q = probe.placed(probe.opening, np.maximum(gap(probe.case.q0)[probe.opening], 0.0) + CLEAR)
+    if len(probe.held) or np.any(gap(q)[probe.opening] <= 0.5 * CLEAR):
+        return  # rows that are always on are soft in engines, and take their time
+    v = np.random.default_rng(SEED).uniform(-FAST, FAST, len(probe.case.v0))
+    exact = engines.load("reference").prepare(
+        probe.begun(q, v, t_end), "compiled", samples=(0.0, 0.5 * t_end, t_end)
+    ).run()  # fmt: skip
+    run = probe.stepped(q, v, PART, STEPS)
+    if not exact.outcome.ok:
+        return
+    wanted, bends = exact.v[-1] - v, float(np.max(np.abs(exact.v[-1] - 2.0 * exact.v[len(exact.t) // 2] + v)))
+    least = t_end / probe.case.t_end * FAST
+    size = max(float(np.max(np.abs(wanted))), least) + bends / TOLERANCE
+    changed = np.full(len(v), np.inf) if run is None else run.v[-1] - v
+    yield _row("acceleration", changed / t_end, wanted / t_end, float(np.max(np.abs(changed - wanted))) / size)
+    if run is not None and size > 2.0 * least:
+        yield from _places(probe, run, (q, v), wanted)
+
+
+def _places(probe: Probe, run: Trajectory, start: tuple[Floats, Floats], wanted: Floats) -> Iterator[AuditRow]:
+    """Tell by which part of the change of velocities in a step it moves bodies."""
+    (q, v), dt, turning = start, PART * probe.dt, [i + k for i in probe.case.quaternions for k in range(4)]
+    straight = np.delete(np.arange(len(q)), turning)
+    moved = (run.q[-1] - q - STEPS * dt * probe.system.displacement(q, v))[straight]
+    change = probe.system.displacement(q, wanted)[straight]
+    size = dt * float(change @ change)
+    known = float(np.max(np.abs(q))) * float(np.finfo(np.float64).eps) * float(np.linalg.norm(change))
+    if size * OF_PLACES > 10.0 * known:
+        theta, promised = float(moved @ change) / size - 0.5 * (STEPS - 1), probe.engine.steps[probe.profile]
+        yield _row("positions", theta, promised, abs(theta - promised), OF_PLACES)
+
+
+def _blows(probe: Probe) -> Iterator[AuditRow]:
+    """Let pairs meet, one at a time; yield what is worst of all."""
+    if probe.meets > FASTEST:
+        return
+    found = [row for rows, mu in _pairs(probe) for row in _blow(probe, rows, mu)]
+    for quantity in dict.fromkeys(row.quantity for row in found):
+        yield max((row for row in found if row.quantity == quantity), key=lambda row: row.difference)
+
+
+def _pairs(probe: Probe) -> Iterator[tuple[Rows, float]]:
+    """Yield the normal rows of every pair, and its coefficient of friction."""
+    case = probe.case
+    named = {name: i for i, name in enumerate(case.contacts)}
+    met: Sequence[Contact] = contacts(case.scene) if case.general and case.scene is not None else ()
+    for contact in met:
+        yield np.array([named[name] for name in contact.normals]), contact.friction
+    if not met:
+        yield from ((np.array([row]), 0.0) for row in probe.opening[:1])
+
+
+def _blow(probe: Probe, pair: Rows, mu: float) -> Iterator[AuditRow]:
+    """Let one pair meet at its nearest places, and slip along one of its tangents."""
+    met = next((met for way in (0, 1, -1) if (met := _meeting(probe, pair, way if mu > 0.0 else -1))), None)
+    if met is None or (met.way < 0 and not np.isfinite(probe.restitution)):
+        return
+    run, free = (probe.stepped(q, met.v, OF_BLOWS, BLOWS) for q in (met.q, met.away))
+    if run is None or free is None:
+        return
+    if np.isfinite(e := probe.restitution):
+        left = probe.theirs["H"](met.q)[met.rows] @ run.v[-1] / probe.meets
+        found = float(left[np.argmax(np.abs(left - e))])
+        yield _row("restitution", found, e, abs(found - e))
+    if met.way >= 0:
+        yield from _rubbed(probe, met, run.v[-1] - free.v[-1], mu)
+
+
+def _rubbed(probe: Probe, met: Meeting, change: Floats, mu: float) -> Iterator[AuditRow]:
+    """Tell friction over what pushes, here or without friction: some engines take that for its bound."""
+    H, M, count = probe.theirs["H"](met.q), probe.theirs["M"](met.q), len(met.rows)
+    p = np.linalg.lstsq(H[np.concatenate([met.rows, probe.ways(met.rows), probe.held])].T, M @ change)[0]
+    pushed, rubbed = float(np.sum(p[:count])), -float(np.sum(p[count + met.way : 3 * count : len(WAYS)]))
+    if not pushed > NONE * float(np.max(np.abs(M @ met.v))):
+        return
+    alone = H[met.rows] @ np.linalg.solve(M, H[met.rows].T)
+    plain = float(np.sum(np.linalg.lstsq(alone, np.full(count, probe.meets * (1.0 + probe.restitution)))[0]))
+    found = min((rubbed / push for push in (pushed, plain) if np.isfinite(push)), key=lambda one: abs(one - mu))
+    yield _row("friction", found, mu, abs(found - mu) / mu)
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A state just before a pair meets, without a turn.
+
+    Attributes:
+        q, v: the state. away: positions far from it.
+        rows: normal rows that meet.
+        way: along which of their two tangents they slip; below 0 for none.
+    """
+
+    q: Floats
+    v: Floats
+    away: Floats
+    rows: Rows
+    way: int
+
+
+def _meeting(probe: Probe, pair: Rows, way: int) -> Meeting | None:
+    """Return a state; None where no motion brings the pair together so, or none that leaves the others alone."""
+    gap, step = probe.theirs["gap"](probe.case.q0), OF_BLOWS * probe.dt * probe.meets
+    others = np.setdiff1d(probe.opening, pair)
+    kept = np.concatenate([gap[probe.held], np.maximum(gap[others], 0.0) + CLEAR])
+    every, apart = np.concatenate([probe.held, others, pair]), gap[pair] - np.min(gap[pair])
+    q, away = (probe.placed(every, np.concatenate([kept, apart + high])) for high in (BEFORE * step, CLEAR))
+    ways = probe.ways(pair) if way >= 0 else np.zeros(0, dtype=int)
+    H = probe.theirs["H"](q)[np.concatenate([probe.held, pair, ways])]
+    slips = SLIPS * probe.meets * (np.arange(len(ways)) % len(WAYS) == way)
+    rates = np.concatenate([np.zeros(len(probe.held)), np.full(len(pair), -probe.meets), slips])
+    v = np.linalg.lstsq(H, rates)[0]
+    near = np.allclose(probe.theirs["gap"](q)[every], [*kept, *(apart + BEFORE * step)], rtol=0.0, atol=1e-3 * step)
+    alike = np.allclose(H @ v, rates, rtol=0.0, atol=1e-9 * probe.meets)
+    return Meeting(q, v, away, pair[apart < ROUNDED], way) if near and alike else None
+
+
+def _row(quantity: str, mine: Any, theirs: Any, off: float, tolerance: float = TOLERANCE) -> AuditRow:
+    mine, theirs = (" ".join(f"{x:.6g}" for x in np.atleast_1d(value)) for value in (mine, theirs))
+    off = off if np.isfinite(off) else np.inf
+    return AuditRow(quantity=quantity, mine=mine, theirs=theirs, difference=off, tolerance=tolerance)
