@@ -250,11 +250,18 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
         return
     for claim in case.claims:
         if claim.metric not in seen:
-            yield Verdict(
-                case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=claim.metric,
-                value=math.nan, expected=claim.expected, unit="", tier=claim.tier.value,
-                verdict=Word.OUTSIDE, command=command, why=f"No run was judged by the claim: {claim.source}.",
-            )  # fmt: skip
+            why = f"No run was judged by the claim: {claim.source}."
+            yield _of_truth(
+                case, f"{claim.metric} (claim)", why, command, tier=claim.tier.value, expected=claim.expected
+            )
+
+
+def _of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> Verdict:
+    """Return a row that is outside of no run: no metric has its name, so that nobody looks for one."""
+    return Verdict(
+        case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=metric, unit="", verdict=Word.OUTSIDE,
+        command=command, why=why, **({"value": math.nan} | more),
+    )  # fmt: skip
 
 
 def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
@@ -278,10 +285,7 @@ def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
             why = f"A control passes: {fault} is no number outside."
         else:
             why = f"A control is not seen as it is: {fault} must come out between {least:.3g} and {most:.3g}."
-        yield Verdict(
-            case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=f"{name} (control)", value=value,
-            unit="", tier=truth.tier.value, verdict=Word.OUTSIDE, command=command, why=why,
-        )  # fmt: skip
+        yield _of_truth(case, f"{name} (control)", why, command, tier=truth.tier.value, value=value)
 
 
 def _unruled(case: Case) -> Iterator[Blind]:
@@ -316,6 +320,11 @@ def longer(case: Case) -> float:
     return max(case.t_end / own, 1.0)
 
 
+def _unit(metric: str, case: Case) -> float:
+    """Return what the largest errors of a metric are parts of: 1, or of instants the horizon where it is shorter, s."""
+    return min(case.t_end, 1.0) if "_times" in metric else 1.0
+
+
 class _Judge:
     """Fills in what all rows of one run share."""
 
@@ -346,7 +355,7 @@ class _Judge:
         why += f"; the horizon is {longer:.3g} times the case's own" if longer > 1.0 else ""
         why += f"; {self.looser:.3g} times that tolerance was requested" if looser > 1.0 else ""
         claim = self.claims.get(metric)
-        widest = WIDEST * (abs(claim.expected) if claim is not None and claim.expected else 1.0)
+        widest = WIDEST * (abs(claim.expected) if claim is not None and claim.expected else _unit(metric, self.case))
         return replace(found, value=max(found.value, min(found.value * times, widest)), why=why)
 
     def hides(self) -> bool:

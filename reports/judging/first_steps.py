@@ -222,7 +222,7 @@ def _blow(probe: Probe, pair: Rows, mu: float) -> Iterator[AuditRow]:
     if np.isfinite(e := probe.restitution):
         left = probe.theirs["H"](met.q)[met.rows] @ run.v[-1] / probe.meets
         found = float(left[np.argmax(np.abs(left - e))])
-        yield _row("restitution", found, e, abs(found - e))
+        yield _row("restitution", found, e, abs(found - e) / (e or 1.0))
     if met.way >= 0:
         yield from _rubbed(probe, met, run.v[-1] - free.v[-1], mu)
 
