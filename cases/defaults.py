@@ -98,7 +98,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
 
 
 SHORT, BRIEF = 1e-6, 0.1
-"""To which instants are judged, s, and the horizon below which it is as much of it less, s: a motion may be as brief."""
+"""To which instants are judged, s, and the horizon below which it is as much of it less, s."""
 
 
 def shortest(t_end: float) -> float:

@@ -95,7 +95,8 @@ class Pymunk(Engine):
         step = 1e-3 if profile == "matched" else USUAL
         used = _settings.chosen(self.name, profile, settings(case, scene, step), given)
         world = World(scene, float(used["restitution"]), profile == "matched")
-        masses = [float(body.mass) for body in world.bodies]
+        masses, space = [float(body.mass) for body in world.bodies], world.space
+        used = used | {"iterations": int(space.iterations), "slop": float(space.collision_slop)}
         return stepped((self.name, profile), case, used, world, masses, -float(world.axis.dot(world.space.gravity)))
 
 
