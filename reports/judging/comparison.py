@@ -267,6 +267,7 @@ def _of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> V
 def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
     from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
+    from crossbody.reports.judging.planted import PART
 
     near = _Judge(case, JUDGED, truth, command)
     far = _Judge(case, JUDGED, replace(truth, grows=FAR), command)
@@ -274,8 +275,9 @@ def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
 
     def outside(name: str, value: float) -> bool:
         rows = [near.judged(name, off, "", truth, 1.0) for off in (value, -value)]
-        if metrics.load(name).UNIT == "1" and near.longer == 1.0:  # other units have caps in their own
-            rows.append(far.judged(name, value, "", truth, 1.0))
+        unit = metrics.load(name).UNIT
+        if unit in ("1", "s") and near.longer == 1.0:  # other units have caps in their own
+            rows.append(far.judged(name, value if unit == "1" else PART * case.t_end, "", truth, 1.0))
         if name == "position" and not math.isnan(truth.allowed):  # another source that is off so much is no witness
             rows += truth_row(case, replace(truth, agreement={name: value}), command)
         return all(row.verdict == Word.OUTSIDE for row in rows) or _lets_pass(case, name, value)

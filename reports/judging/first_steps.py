@@ -3,8 +3,8 @@
 A known property of such an engine is as large as its step, and a parameter that is off by some per cent hides behind
 it. Of steps a thousandth as long nothing is left, and what they do is known in closed form. Where nothing touches,
 velocities change by v' dt, and theta of the change counts where a step moves bodies (`Engine.steps`). Where one pair
-meets at the speed w, it parts at e w; and where it slips fast besides, |p_t| = mu p_n with
-M (v - v of the same steps where nothing touches) = H_n^T p_n + H_t^T p_t.
+meets at the speed w, within half a step of its touch, it parts at e w; and where it slips fast besides, |p_t| =
+mu p_n with M (v - v of the same steps where nothing touches) = H_n^T p_n + H_t^T p_t.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ BEFORE = 2.75
 """How many steps before a pair meets."""
 TOLERANCE, OF_PLACES = 2e-3, 0.02
 """To which a force or a restitution is what it must be, and theta."""
+CHANGES, HALF = 2e-7, 0.5
+"""Part of a velocity that is a change; and how many steps from its touch a pair meets at most."""
 NEWTON, ROUNDED, NONE = 20, 1e-13, 1e-10
 """Iterations that place bodies, m; and part of a momentum that is none."""
 SEED, USUAL = 20240917, 1e-3
@@ -223,8 +225,21 @@ def _blow(probe: Probe, pair: Rows, mu: float) -> Iterator[AuditRow]:
         left = probe.theirs["H"](met.q)[met.rows] @ run.v[-1] / probe.meets
         found = float(left[np.argmax(np.abs(left - e))])
         yield _row("restitution", found, e, abs(found - e) / (e or 1.0))
+    if len(run.t) == len(free.t) == BLOWS + 1:
+        yield _touched(probe, probe.theirs["H"](met.q)[met.rows], run.v - free.v)
     if met.way >= 0:
         yield from _rubbed(probe, met, run.v[-1] - free.v[-1], mu)
+
+
+def _touched(probe: Probe, H: Floats, change: Floats) -> AuditRow:
+    """Tell the gap at which a pair meets, in steps: at the first sample whose velocity is another than in free flight.
+
+    Where velocities do not count in how far a step moves, they follow from where it ends.
+    """
+    behind = np.max(np.abs(change @ H.T), axis=1) > CHANGES * probe.meets
+    found = BEFORE - (float(np.argmax(behind)) if behind.any() else np.inf)
+    found += float(probe.engine.steps[probe.profile] > 0.0)
+    return _row("touches", found, 0.0, abs(found), HALF)
 
 
 def _rubbed(probe: Probe, met: Meeting, change: Floats, mu: float) -> Iterator[AuditRow]:

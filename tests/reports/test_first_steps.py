@@ -15,22 +15,22 @@ from crossbody.engines import Engine, Run
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.first_steps import first_steps
 
-FREE, BLOW, RUBS = ("acceleration", "positions"), ("restitution",), ("friction",)
+FREE, BLOW, MEETS, RUBS = ("acceleration", "positions"), ("restitution",), ("touches",), ("friction",)
 SEEN = {
     ("bouncing_ball:linear", "mujoco:default"): FREE,
     ("bouncing_ball:resting", "pinocchio:impulse"): BLOW,
-    ("bouncing_ball:linear", "pinocchio:admm"): FREE + BLOW,
-    ("bouncing_ball:linear", "dart:matched"): FREE + BLOW,
-    ("bouncing_ball:elastic", "pymunk:default"): FREE + BLOW,
+    ("bouncing_ball:linear", "pinocchio:admm"): FREE + BLOW + MEETS,
+    ("bouncing_ball:linear", "dart:matched"): FREE + BLOW + MEETS,
+    ("bouncing_ball:elastic", "pymunk:default"): FREE + BLOW + MEETS,
     ("bouncing_ball:listing", "exudyn:default"): FREE,
-    ("newtons_cradle:pendulums", "pinocchio:admm"): FREE + BLOW,
+    ("newtons_cradle:pendulums", "pinocchio:admm"): FREE + BLOW + MEETS,
     ("newtons_cradle:unequal", "pinocchio:impulse_simultaneous"): BLOW,
     ("dry_oscillator:swings", "mujoco:default"): FREE,
-    ("held_weight:hangs", "mujoco:default"): FREE + RUBS,
-    ("rolling_sphere:side_spin", "dart:default"): FREE + BLOW + RUBS,
-    ("stacked_blocks:top_slides", "pinocchio:admm"): FREE + BLOW + RUBS,
-    ("tossed_cube:tumbles", "dart:matched"): FREE + BLOW + RUBS,
-    ("tossed_cube:loaded", "mujoco:default"): FREE + RUBS,
+    ("held_weight:hangs", "mujoco:default"): FREE + MEETS + RUBS,
+    ("rolling_sphere:side_spin", "dart:default"): FREE + BLOW + MEETS + RUBS,
+    ("stacked_blocks:top_slides", "pinocchio:admm"): FREE + BLOW + MEETS + RUBS,
+    ("tossed_cube:tumbles", "dart:matched"): FREE + BLOW + MEETS + RUBS,
+    ("tossed_cube:loaded", "mujoco:default"): FREE + MEETS + RUBS,
 }
 """What is told of whom; of a case with rows that are always on, or a machine of its own, nothing is."""
 
@@ -93,6 +93,17 @@ def test_a_change_of_velocity_a_per_cent_too_large_is_told(label: str, who: str)
     assert not found["acceleration"].ok
     assert found["acceleration"].difference == pytest.approx(0.01, rel=0.1)
     assert "restitution" not in found or not found["restitution"].ok
+
+
+def early(run: Trajectory) -> Trajectory:
+    """Velocities a step before they change."""
+    return replace(run, v=np.concatenate([run.v[:1], run.v[2:], run.v[-1:]]))
+
+
+def test_a_pair_that_meets_a_step_too_early_is_told() -> None:
+    found = told("sliding_block:stops", "dart:matched", early)
+    assert found["restitution"].ok
+    assert not found["touches"].ok
 
 
 def test_another_rule_for_positions_is_told() -> None:
