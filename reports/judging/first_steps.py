@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody import engines
-from crossbody.cases import Case, CrossbodyError, Trajectory
+from crossbody.cases import Case, CrossbodyError, Inputs, Trajectory
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import normalised
@@ -43,7 +43,7 @@ TOLERANCE, OF_PLACES = 2e-3, 0.02
 """To which a force or a restitution is what it must be, and theta."""
 CHANGES, HALF = 2e-7, 0.5
 """Part of a velocity that is a change; and how many steps from its touch a pair meets at most."""
-NEWTON, ROUNDED, NONE = 20, 1e-13, 1e-10
+NEWTON, ROUNDED, NONE = 20, 1e-13, 1e-8
 """Iterations that place bodies, m; and part of a momentum that is none."""
 SEED, USUAL = 20240917, 1e-3
 Rows = NDArray[np.intp]
@@ -59,6 +59,7 @@ class Probe:
         used, asked: settings of its run, and those of them that were asked for.
         theirs: the reference's audit, with gap(q), H(q) and M(q).
         system: the reference's equations.
+        steps: whether it steps in time, with these.
         opening, held: rows that open, and those that are always on.
     """
 
@@ -69,6 +70,7 @@ class Probe:
     asked: Mapping[str, Any]
     theirs: Mapping[str, Any]
     system: System
+    steps: bool
     opening: Rows = field(init=False)
     held: Rows = field(init=False)
 
@@ -118,13 +120,19 @@ class Probe:
     def stepped(self, q: Floats, v: Floats, part: float, count: int) -> Trajectory | None:
         """Return some steps from a state; None where they fail."""
         given = {**self.asked, **({"dt": part * self.dt} if "dt" in self.used else {})}
-        run = self.engine.prepare(self.begun(q, v, count * part * self.dt), self.profile, **given).run()
+        case = self.begun(q, v, count * part * self.dt, jumps=1 + (part == PART))
+        run = self.engine.prepare(case, self.profile, **given).run()
         return run if run.outcome.ok else None
 
-    def begun(self, q: Floats, v: Floats, t_end: float) -> Case:
-        """Return the case from another state on, up to an instant, s."""
+    def begun(self, q: Floats, v: Floats, t_end: float, jumps: int = 2) -> Case:
+        """Return the case from another state on, up to an instant, s, with inputs that jump; once more in the middle."""
+        scene, inputs = self.case.scene, self.case.inputs
+        names = scene.inputs if scene is not None and self.case.general else ()
+        size = float(np.max(np.abs(inputs.values), initial=1e-3)) if inputs is not None else 1.0
+        values = np.random.default_rng(SEED).uniform(-size, size, (jumps, len(names)))
         return replace(
-            self.case, q0=q, v0=v, t_end=t_end, closed_form=None, claims=(), chaos=None, consistent=False
+            self.case, q0=q, v0=v, t_end=t_end, closed_form=None, claims=(), chaos=None, consistent=False,
+            inputs=Inputs(names=names, times=np.array([0.0, 0.5 * t_end])[:jumps], values=values) if names else None,
         )  # fmt: skip
 
 
@@ -145,11 +153,11 @@ def first_steps(
     system, theta = equations(case), who[0].steps.get(who[1])
     if theta is None or system is None or "gap" not in theirs or not _plain(case):
         return ()
-    probe = Probe(case, *who, used, asked, theirs, system)
     same = all(row.ok for row in audited if row.quantity in ("M", "bias"))
+    probe = Probe(case, *who, used, asked, theirs, system, same and "dt" in used and not math.isnan(theta))
     try:
-        return (*(_free(probe) if same and "dt" in used and not math.isnan(theta) else ()), *_blows(probe))
-    except CrossbodyError:  # a state that the engine or the reference refuses
+        return (*(_free(probe) if probe.steps else ()), *_blows(probe))
+    except (CrossbodyError, np.linalg.LinAlgError):  # a state that the engine or the reference refuses
         return ()
 
 
@@ -165,31 +173,31 @@ def _free(probe: Probe) -> Iterator[AuditRow]:
     if len(probe.held) or np.any(gap(q)[probe.opening] <= 0.5 * CLEAR):
         return  # rows that are always on are soft in engines, and take their time
     v = np.random.default_rng(SEED).uniform(-FAST, FAST, len(probe.case.v0))
-    exact = engines.load("reference").prepare(
-        probe.begun(q, v, t_end), "compiled", samples=(0.0, 0.5 * t_end, t_end)
-    ).run()  # fmt: skip
+    quarters = np.linspace(0.0, t_end, 5)
+    exact = engines.load("reference").prepare(probe.begun(q, v, t_end), "compiled", samples=quarters).run()
     run = probe.stepped(q, v, PART, STEPS)
     if not exact.outcome.ok:
         return
-    wanted, bends = exact.v[-1] - v, float(np.max(np.abs(exact.v[-1] - 2.0 * exact.v[len(exact.t) // 2] + v)))
-    least = t_end / probe.case.t_end * FAST
+    wanted, least = exact.v[-1] - v, t_end / probe.case.t_end * FAST
+    along = np.array([exact.v[np.searchsorted(exact.t, t, side="right") - 1] for t in quarters])  # inputs jump amid
+    bends = float(np.max(np.abs(along[2::2] - 2.0 * along[1::2] + along[:-1:2])))
     size = max(float(np.max(np.abs(wanted))), least) + bends / TOLERANCE
     changed = np.full(len(v), np.inf) if run is None else run.v[-1] - v
     yield _row("acceleration", changed / t_end, wanted / t_end, float(np.max(np.abs(changed - wanted))) / size)
     if run is not None and size > 2.0 * least:
-        yield from _places(probe, run, (q, v), wanted)
+        yield from _places(probe, run)
 
 
-def _places(probe: Probe, run: Trajectory, start: tuple[Floats, Floats], wanted: Floats) -> Iterator[AuditRow]:
+def _places(probe: Probe, run: Trajectory) -> Iterator[AuditRow]:
     """Tell by which part of the change of velocities in a step it moves bodies."""
-    (q, v), dt, turning = start, PART * probe.dt, [i + k for i in probe.case.quaternions for k in range(4)]
-    straight = np.delete(np.arange(len(q)), turning)
-    moved = (run.q[-1] - q - STEPS * dt * probe.system.displacement(q, v))[straight]
-    change = probe.system.displacement(q, wanted)[straight]
-    size = dt * float(change @ change)
-    known = float(np.max(np.abs(q))) * float(np.finfo(np.float64).eps) * float(np.linalg.norm(change))
-    if size * OF_PLACES > 10.0 * known:
-        theta, promised = float(moved @ change) / size - 0.5 * (STEPS - 1), probe.engine.steps[probe.profile]
+    turning, dt = [i + k for i in probe.case.quaternions for k in range(4)], np.diff(run.t)
+    straight = np.delete(np.arange(run.q.shape[1]), turning)
+    q, parts = np.array(run.q[0]), (run.v[:-1], np.diff(run.v, axis=0))
+    moved, change = (probe.system.displacement(q, dt @ part)[straight] for part in parts)
+    known = float(np.max(np.abs(run.q))) * float(np.finfo(np.float64).eps)
+    if float(np.linalg.norm(change)) * OF_PLACES > 10.0 * known:
+        more, promised = (run.q[-1] - run.q[0])[straight] - moved, probe.engine.steps[probe.profile]
+        theta = float(more @ change) / float(change @ change)
         yield _row("positions", theta, promised, abs(theta - promised), OF_PLACES)
 
 
@@ -216,43 +224,50 @@ def _pairs(probe: Probe) -> Iterator[tuple[Rows, float]]:
 def _blow(probe: Probe, pair: Rows, mu: float) -> Iterator[AuditRow]:
     """Let one pair meet at its nearest places, and slip along one of its tangents."""
     met = next((met for way in (0, 1, -1) if (met := _meeting(probe, pair, way if mu > 0.0 else -1))), None)
-    if met is None or (met.way < 0 and not np.isfinite(probe.restitution)):
+    if met is None:
         return
     run, free = (probe.stepped(q, met.v, OF_BLOWS, BLOWS) for q in (met.q, met.away))
     if run is None or free is None:
         return
-    if np.isfinite(e := probe.restitution):
-        left = probe.theirs["H"](met.q)[met.rows] @ run.v[-1] / probe.meets
+    H, e = probe.theirs["H"](met.q), probe.restitution
+    if np.isfinite(e):
+        left = H[met.rows] @ run.v[-1] / probe.meets
         found = float(left[np.argmax(np.abs(left - e))])
         yield _row("restitution", found, e, abs(found - e) / (e or 1.0))
-    if len(run.t) == len(free.t) == BLOWS + 1:
-        yield _touched(probe, probe.theirs["H"](met.q)[met.rows], run.v - free.v)
-    if met.way >= 0:
-        yield from _rubbed(probe, met, run.v[-1] - free.v[-1], mu)
+    if probe.steps and len(run.t) == len(free.t) == BLOWS + 1:
+        yield from _touched(probe, (run.v - free.v) @ H[met.rows].T)
+        yield from _pressed(probe, met, (run.lam - free.lam)[:, met.among], run.v[-1] - free.v[-1], mu)
 
 
-def _touched(probe: Probe, H: Floats, change: Floats) -> AuditRow:
+def _touched(probe: Probe, rates: Floats) -> Iterator[AuditRow]:
     """Tell the gap at which a pair meets, in steps: at the first sample whose velocity is another than in free flight.
 
     Where velocities do not count in how far a step moves, they follow from where it ends.
     """
-    behind = np.max(np.abs(change @ H.T), axis=1) > CHANGES * probe.meets
-    found = BEFORE - (float(np.argmax(behind)) if behind.any() else np.inf)
-    found += float(probe.engine.steps[probe.profile] > 0.0)
-    return _row("touches", found, 0.0, abs(found), HALF)
+    behind = np.flatnonzero(np.max(np.abs(rates), axis=1) > CHANGES * probe.meets)
+    if len(behind):  # a spring pushes later
+        found = BEFORE - float(behind[0]) + float(probe.engine.steps[probe.profile] > 0.0)
+        yield _row("touches", found, 0.0, abs(found), HALF)
 
 
-def _rubbed(probe: Probe, met: Meeting, change: Floats, mu: float) -> Iterator[AuditRow]:
-    """Tell friction over what pushes, here or without friction: some engines take that for its bound."""
-    H, M, count = probe.theirs["H"](met.q), probe.theirs["M"](met.q), len(met.rows)
-    p = np.linalg.lstsq(H[np.concatenate([met.rows, probe.ways(met.rows), probe.held])].T, M @ change)[0]
-    pushed, rubbed = float(np.sum(p[:count])), -float(np.sum(p[count + met.way : 3 * count : len(WAYS)]))
-    if not pushed > NONE * float(np.max(np.abs(M @ met.v))):
+def _pressed(probe: Probe, met: Meeting, lam: Floats, change: Floats, mu: float) -> Iterator[AuditRow]:
+    """Hold the forces that are recorded against what they do, and friction against what pushes.
+
+    A force is that of the step before its instant, or of the one behind it.
+    """
+    H, M = probe.theirs["H"](met.q), probe.theirs["M"](met.q)
+    p = np.linalg.lstsq(H[np.concatenate([met.among, probe.held])].T, M @ change)[0]
+    every, recorded = met.sums(p), (OF_BLOWS * probe.dt * met.sums(part.sum(axis=0)) for part in (lam[1:], lam[:-1]))
+    if not every[0] > NONE * float(np.max(np.abs(M @ met.v))):
         return
-    alone = H[met.rows] @ np.linalg.solve(M, H[met.rows].T)
-    plain = float(np.sum(np.linalg.lstsq(alone, np.full(count, probe.meets * (1.0 + probe.restitution)))[0]))
-    found = min((rubbed / push for push in (pushed, plain) if np.isfinite(push)), key=lambda one: abs(one - mu))
-    yield _row("friction", found, mu, abs(found - mu) / mu)
+    told = min(recorded, key=lambda one: float(np.max(np.abs(one - every))))
+    yield _row("forces", told, every, float(np.max(np.abs(told - every))) / every[0])
+    if met.way >= 0:
+        alone = H[met.rows] @ np.linalg.solve(M, H[met.rows].T)
+        blow = np.full(len(met.rows), probe.meets * (1.0 + probe.restitution))
+        pushes = (every[0], float(np.sum(np.linalg.lstsq(alone, blow)[0])))  # some bound it by that without friction
+        found = min((-every[1 + met.way] / push for push in pushes if np.isfinite(push)), key=lambda x: abs(x - mu))
+        yield _row("friction", found, mu, abs(found - mu) / mu)
 
 
 @dataclass(frozen=True)
@@ -261,7 +276,7 @@ class Meeting:
 
     Attributes:
         q, v: the state. away: positions far from it.
-        rows: normal rows that meet.
+        rows: normal rows that meet. among: these, and behind them their tangents, if they slip.
         way: along which of their two tangents they slip; below 0 for none.
     """
 
@@ -269,7 +284,14 @@ class Meeting:
     v: Floats
     away: Floats
     rows: Rows
+    among: Rows
     way: int
+
+    def sums(self, values: Floats) -> Floats:
+        """Return what all places bear together: along the normal, and along each tangent."""
+        count = len(self.rows)
+        ways = [values[count + k : 3 * count : len(WAYS)].sum() for k in range(len(WAYS) if self.way >= 0 else 0)]
+        return np.array([values[:count].sum(), *ways])
 
 
 def _meeting(probe: Probe, pair: Rows, way: int) -> Meeting | None:
@@ -286,7 +308,10 @@ def _meeting(probe: Probe, pair: Rows, way: int) -> Meeting | None:
     v = np.linalg.lstsq(H, rates)[0]
     near = np.allclose(probe.theirs["gap"](q)[every], [*kept, *(apart + BEFORE * step)], rtol=0.0, atol=1e-3 * step)
     alike = np.allclose(H @ v, rates, rtol=0.0, atol=1e-9 * probe.meets)
-    return Meeting(q, v, away, pair[apart < ROUNDED], way) if near and alike else None
+    if not (near and alike):
+        return None
+    rows = pair[apart < ROUNDED]
+    return Meeting(q, v, away, rows, np.concatenate([rows, probe.ways(rows)]) if way >= 0 else rows, way)
 
 
 def _row(quantity: str, mine: Any, theirs: Any, off: float, tolerance: float = TOLERANCE) -> AuditRow:

@@ -12,12 +12,14 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, Trajectory
 from crossbody.engines import Engine, Run
+from crossbody.engines._acting import Acting
+from crossbody.reports.judging import first_steps as first_steps_of
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.first_steps import first_steps
 
-FREE, BLOW, MEETS, RUBS = ("acceleration", "positions"), ("restitution",), ("touches",), ("friction",)
+FREE, BLOW, MEETS, RUBS = ("acceleration", "positions"), ("restitution",), ("touches", "forces"), ("friction",)
 SEEN = {
-    ("bouncing_ball:linear", "mujoco:default"): FREE,
+    ("bouncing_ball:linear", "mujoco:default"): FREE + MEETS,
     ("bouncing_ball:resting", "pinocchio:impulse"): BLOW,
     ("bouncing_ball:linear", "pinocchio:admm"): FREE + BLOW + MEETS,
     ("bouncing_ball:linear", "dart:matched"): FREE + BLOW + MEETS,
@@ -93,6 +95,28 @@ def test_a_change_of_velocity_a_per_cent_too_large_is_told(label: str, who: str)
     assert not found["acceleration"].ok
     assert found["acceleration"].difference == pytest.approx(0.01, rel=0.1)
     assert "restitution" not in found or not found["restitution"].ok
+
+
+def lighter(run: Trajectory) -> Trajectory:
+    return replace(run, lam=0.99 * run.lam)
+
+
+@pytest.mark.parametrize("who", ["pinocchio:admm", "mujoco:default", "dart:matched"])
+def test_a_force_a_per_cent_too_small_is_told(who: str) -> None:
+    found = told("sliding_block:stops", who, lighter)
+    assert [name for name, row in found.items() if not row.ok] == ["forces"]
+    assert found["forces"].difference == pytest.approx(0.01, rel=1e-3)
+
+
+def test_an_input_that_comes_a_step_late_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    at = Acting.at
+
+    def late(acting: Acting, t: float, q: Any, v: Any) -> Any:
+        return at(acting, t - 0.5 * acting.case.t_end / first_steps_of.STEPS, q, v)
+
+    assert told("stacked_blocks:apart", "pinocchio:admm")["acceleration"].ok
+    monkeypatch.setattr(Acting, "at", late)
+    assert not told("stacked_blocks:apart", "pinocchio:admm")["acceleration"].ok
 
 
 def early(run: Trajectory) -> Trajectory:
