@@ -236,3 +236,16 @@ def test_what_no_noise_and_no_weight_is_an_impact(seed: int, pull: float) -> Non
     assert least_of(t, y) == pytest.approx(max(clear, 0.25 * pull), rel=0.1)
     hit = 100.0 * clear
     assert least_of(t, y + hit * STEP * np.maximum(t - t[900], 0.0)) == pytest.approx(0.25 * (hit + pull), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_correlations_at_lags_are_those_of_the_samples_that_both_have_there(seed: int) -> None:
+    """Of windows whose size changes along them, counted sample by sample."""
+    random = np.random.default_rng(seed)
+    lengths, most = random.integers(9, 30, 3), 5
+    a, b = ([random.standard_normal(n) * np.exp(3.0 * np.arange(n) / n) for n in lengths] for _ in range(2))
+    lags, rho = _measures._lagged(a, b, most)
+    for lag, found in zip(lags, rho, strict=True):
+        pairs = [(x[i + lag], y[i]) for x, y in zip(a, b, strict=True) for i in range(len(y)) if 0 <= i + lag < len(x)]
+        x, y = np.array(pairs).T
+        assert found == pytest.approx(x @ y / np.sqrt((x @ x) * (y @ y)), abs=1e-12)
