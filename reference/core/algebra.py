@@ -81,6 +81,28 @@ def solve_mass(L: Floats, x: Array, above: Index, k: int, first: int, last: int)
 
 
 @compiled
+def solve_columns(L: Floats, X: Floats, above: Index, n: int, count: int) -> None:
+    """X := M^-1 X, in place, for the first `count` columns of X and a mass matrix that is one block."""
+    for i in range(n - 1, -1, -1):
+        c = above[i]
+        while c >= 0:
+            part = L[i, c]
+            for j in range(count):
+                X[c, j] -= part * X[i, j]
+            c = above[c]
+    for i in range(n):
+        part = L[i, i]
+        for j in range(count):
+            X[i, j] *= part
+        c = above[i]
+        while c >= 0:
+            part = L[i, c]
+            for j in range(count):
+                X[i, j] -= part * X[c, j]
+            c = above[c]
+
+
+@compiled
 def factor_schur(G: Floats, na: int, reach: Index, idx: Index, shares: Bytes) -> int:
     """Cholesky factor of the Schur complement in its lower triangle.
 

@@ -253,6 +253,8 @@ class Work:
     w: Floats
     H: Floats2  # (nc, n) active rows, compact
     X: Floats2  # (nc, n) M^-1 H^T, transposed
+    right: Floats2  # (n, nc) H^T of active rows, and
+    solved: Floats2  # (n, nc) M^-1 H^T, where they are solved at once
     X0: Floats2  # (nc, n) M^-1 H^T at the step's start, of the rows that are always on
     pivot0: Floats  # (nc,) their pivots at the start
     overlap: Floats2  # (nc, nc) H_1 M_0^-1 H_0^T
@@ -416,6 +418,7 @@ def workspace(
         "z": (nz,), "z1": (nz,), "kz": (DENSE_STAGES, nz), "Fz": (DENSE_TERMS, nz),
         "e": (2,), "u": (nu,), "s": (ns,), "w": (nw,),
         "M": (n, k), "L": (n, k), "H": (nc, n), "X": (nc, n), "X0": (nc, n),
+        **dict.fromkeys(("right", "solved"), (n, nc)),
         **dict.fromkeys(("G", "overlap", "null", "gram", "part"), (nc, nc)), "law": (nc, 3),
         **dict.fromkeys(("f", "vd", "free", "d", "g", "pivot", "pull", "shift"), (n,)),
         **dict.fromkeys(("J", "Jq", "Jv"), (n, n)),
