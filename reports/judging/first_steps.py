@@ -35,8 +35,9 @@ STEPS, BLOWS = 4, 8
 """How many."""
 CLEAR = 1e-3
 """Gap, m, of what does not touch: no motion of that time crosses it."""
-FAST, MEETS, SLIPS, FASTEST = 0.5, 1.0, 30.0, 100.0
-"""Velocities, SI, of what is free and at which a pair meets, how many times as fast it slips, and the fastest."""
+FAST, MEETS, SLIPS, FASTEST, PARTS = 0.5, 1.0, 30.0, 100.0, 0.5
+"""Velocities, SI, of what is free and at which a pair meets, how many times as fast it slips, the fastest, and the
+slowest at which one parts that tells a restitution."""
 BEFORE = 2.75
 """How many steps before a pair meets."""
 TOLERANCE, OF_PLACES = 2e-3, 0.02
@@ -92,14 +93,15 @@ class Probe:
         """What pairs must part with; NaN where the engine has none, or rows have their own."""
         law = self.case.law
         kinds = np.unique(np.stack([law.a0, law.a1, law.b0, law.b1])[:, self.opening], axis=1).shape[1]
-        alike = kinds == 1 or "restitution" in self.asked
-        return float(self.used.get("restitution", np.nan)) if alike else np.nan
+        alike, e = kinds == 1 or "restitution" in self.asked, float(self.used.get("restitution", np.nan))
+        return e if alike and (e == 0.0 or e * self.meets >= PARTS) else np.nan
 
     @property
     def meets(self) -> float:
-        """Speed at which pairs meet, m/s: where no step hides it, impacts that are too slow are captured."""
+        """Speed at which pairs meet, m/s: engines let those rest that part too slowly, and the law captures some."""
         if "dt" in self.used or not len(self.opening):
-            return MEETS
+            e = float(self.used.get("restitution", 0.0))
+            return min(max(MEETS, MEETS / e), FASTEST) if e > 0.0 else MEETS
         a0, a1 = float(self.case.law.a0[self.opening[0]]), float(self.case.law.a1[self.opening[0]])
         slow = cf.threshold_speed(a0, a1, float(self.theirs.get("gravity", 0.0))) if a0 > 0.0 else math.inf
         return max(MEETS, 2.0 * slow)
@@ -226,7 +228,7 @@ def _pairs(probe: Probe) -> Iterator[tuple[Rows, float]]:
 
 def _blow(probe: Probe, pair: Rows, mu: float) -> Iterator[AuditRow]:
     """Let one pair meet at its nearest places, and slip along one of its tangents."""
-    met = next((met for way in (0, 1, -1) if (met := _meeting(probe, pair, way if mu > 0.0 else -1))), None)
+    met = next((met for way in (0, 1, -1) if (met := _meeting(probe, pair, way if mu > 0.0 else -1, mu))), None)
     if met is None:
         return
     run, free = (probe.stepped(q, met.v, OF_BLOWS, BLOWS) for q in (met.q, met.away))
@@ -297,7 +299,7 @@ class Meeting:
         return np.array([values[:count].sum(), *ways])
 
 
-def _meeting(probe: Probe, pair: Rows, way: int) -> Meeting | None:
+def _meeting(probe: Probe, pair: Rows, way: int, mu: float) -> Meeting | None:
     """Return a state; None where no motion brings the pair together so, or none that leaves the others alone."""
     gap, step = probe.theirs["gap"](probe.case.q0), OF_BLOWS * probe.dt * probe.meets
     others = np.setdiff1d(probe.opening, pair)
@@ -314,7 +316,17 @@ def _meeting(probe: Probe, pair: Rows, way: int) -> Meeting | None:
     if not (near and alike):
         return None
     rows = pair[apart < ROUNDED]
-    return Meeting(q, v, away, rows, np.concatenate([rows, probe.ways(rows)]) if way >= 0 else rows, way)
+    found = Meeting(q, v, away, rows, np.concatenate([rows, probe.ways(rows)]) if way >= 0 else rows, way)
+    return found if way < 0 or _bears(probe, found, mu) else None
+
+
+def _bears(probe: Probe, met: Meeting, mu: float) -> bool:
+    """Whether all places push where friction is at its bound: none lifts, and none jams."""
+    H, M, count = probe.theirs["H"](met.q)[met.among], probe.theirs["M"](met.q), len(met.rows)
+    pushes = H[:count] - mu * H[count + met.way :: len(WAYS)]
+    answers = H[:count] @ np.linalg.solve(M, pushes.T)
+    p = np.linalg.lstsq(answers, np.ones(count))[0]
+    return bool(np.all(p > 0.0) and np.allclose(answers @ p, 1.0))
 
 
 def _row(quantity: str, mine: Any, theirs: Any, off: float, tolerance: float = TOLERANCE) -> AuditRow:
