@@ -93,8 +93,10 @@ class Probe:
         """What pairs must part with; NaN where the engine has none, or rows have their own."""
         law = self.case.law
         kinds = np.unique(np.stack([law.a0, law.a1, law.b0, law.b1])[:, self.opening], axis=1).shape[1]
-        alike, e = kinds == 1 or "restitution" in self.asked, float(self.used.get("restitution", np.nan))
-        return e if alike and (e == 0.0 or e * self.meets >= PARTS) else np.nan
+        asked, e = "restitution" in self.asked, float(self.used.get("restitution", np.nan))
+        if kinds == 1 and not asked and e > 0.0:
+            e = _of_law(*(float(part[self.opening[0]]) for part in (law.a0, law.a1, law.b0, law.b1)))
+        return e if (asked or kinds == 1) and (e == 0.0 or e * self.meets >= PARTS) else np.nan
 
     @property
     def meets(self) -> float:
@@ -164,6 +166,13 @@ def first_steps(
         return (*(_free(probe) if probe.steps else ()), *_blows(probe))
     except (CrossbodyError, np.linalg.LinAlgError):  # a state that the engine or the reference refuses
         return ()
+
+
+def _of_law(a0: float, a1: float, b0: float, b1: float) -> float:
+    """Return the restitution of a row's linear part as it is entered: its rate where its force ends, of one inwards."""
+    arc = cf.LinearArc(*((b0, b1) if b0 > 0.0 else (a0, a1)), 0.0, -1.0)
+    ends = arc.rate.rate.first_zero()
+    return float(arc.rate(ends)) if math.isfinite(ends) else 0.0
 
 
 def _plain(case: Case) -> bool:

@@ -11,11 +11,12 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Trajectory
+from crossbody.cases import closed_forms as cf
 from crossbody.engines import Engine, Run
 from crossbody.engines._acting import Acting
 from crossbody.reports.judging import first_steps as first_steps_of
 from crossbody.reports.judging.audit import AuditRow, audit
-from crossbody.reports.judging.first_steps import first_steps
+from crossbody.reports.judging.first_steps import _of_law, first_steps
 
 FREE, BLOW, MEETS, RUBS = ("acceleration", "positions"), ("restitution",), ("touches", "forces"), ("friction",)
 SEEN = {
@@ -156,9 +157,9 @@ def test_another_friction_is_told(who: str) -> None:
 def test_a_restitution_that_was_asked_for_is_what_pairs_part_with() -> None:
     case, engine = cases.load("bouncing_ball", "linear"), engines.load("pinocchio")
     theirs = engines.load("reference").prepare(case, "compiled").audit()
-    for asked, ok in ({"restitution": 0.5}, True), ({}, False):
-        used = {**engine.prepare(case, "admm").settings, "restitution": 0.5}
-        rows = first_steps(case, (engine, "admm"), used, asked, (), theirs)
+    for claimed, ok in (0.5, True), (0.505, False):
+        used = {**engine.prepare(case, "admm").settings, "restitution": claimed}
+        rows = first_steps(case, (engine, "admm"), used, {"restitution": 0.5}, (), theirs)
         assert [row.ok for row in rows if row.quantity == "restitution"] == [ok]
 
 
@@ -166,3 +167,25 @@ def test_an_engine_of_ones_own_that_promises_no_steps_is_not_asked() -> None:
     case, engine = cases.load("bouncing_ball", "linear"), engines.load("reference")
     used = engine.prepare(case, "compiled").settings
     assert first_steps(case, (engine, "compiled"), used, {}, (), engine.prepare(case, "compiled").audit()) == ()
+
+
+@pytest.mark.parametrize("a1", [0.0, 20.0, 200.0, 350.0])
+def test_the_restitution_of_the_law_is_that_of_its_arcs(a1: float) -> None:
+    """What engines take for it, of strong and of weak damping, is told by another formula."""
+    assert _of_law(1e4, a1, 0.0, 0.0) == pytest.approx(cf.restitution(cf.damping_ratio(1e4, a1)), rel=1e-9)
+    assert _of_law(1.0, 0.0, 1e4, a1) == pytest.approx(_of_law(1e4, a1, 0.0, 0.0))
+
+
+def test_another_restitution_than_the_laws_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = cf.half_angle
+    monkeypatch.setattr(cf, "half_angle", lambda zeta: 0.99 * own(zeta))
+    assert not told("bouncing_ball:linear", "pinocchio:admm")["restitution"].ok
+
+
+@pytest.mark.parametrize("who", ["pinocchio:admm", "mujoco:default"])
+def test_steep_friction_that_would_lift_or_jam_lets_slip_no_pair(who: str) -> None:
+    case, (name, profile) = cases.load("stacked_blocks", "top_drags", high_mu=3.8, gravity=86.0), who.split(":")
+    engine, theirs = engines.load(name), engines.load("reference").prepare(case, "compiled").audit()
+    rows = first_steps(case, (engine, profile), engine.prepare(case, profile).settings, {}, (), theirs)
+    assert rows
+    assert all(row.ok for row in rows)
