@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.linalg import block_diag, toeplitz
 
 from crossbody.hw.fitting.covariance import Layout, _contributions, noise_correlation, scatter
 from crossbody.hw.fitting.difference import Differences
 from crossbody.hw.fitting.doubts import agreement
-from crossbody.hw.fitting.information import information
+from crossbody.hw.fitting.information import information, weak
 
 LAYOUTS = (
     Layout(samples=(40,), k=1), Layout(samples=(25, 31), k=2), Layout(samples=(30,) * 5, k=1),
@@ -67,6 +68,7 @@ def test_estimates_scatter_together_as_the_noise_goes_through_their_weights(layo
     for correlation in (0.0, 0.7):
         Q, L, residual = drawn(seed, layout, correlation)
         found, smaller = scatter(Q, L, residual, layout), scatter(Q, 1e-3 * L, residual, layout)
+        np.testing.assert_allclose(found.half, stats.t.ppf(0.975, found.freedom) * found.std)  # 95 % on both sides
         assert smaller.freedom == pytest.approx(found.freedom, rel=1e-9), "units of estimates tell nothing"
         assert smaller.half == pytest.approx(1e-3 * found.half, rel=1e-9)
         if layout.overlap:
@@ -135,3 +137,14 @@ def test_central_differences_are_held_against_those_at_half_their_step() -> None
     np.testing.assert_allclose(J, [[3.0 * x[0] ** 2 + h**2, 0.0], [0.0, 0.0], [0.0, 1.0]], rtol=1e-12)
     found = Cubes().checked(x, J, x, np.zeros(2))
     assert found == pytest.approx(0.75 * h**2 / (3.0 * x[0] ** 2 + h**2))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_directions_are_weak_that_may_be_as_large_as_the_unknowns(seed: int) -> None:
+    """Of relative changes with known deviations along axes at random: those of 1 and more within the interval."""
+    random = np.random.default_rng(seed)
+    axes = np.linalg.qr(random.normal(size=(4, 4)))[0]
+    sizes, told = 10.0 ** random.uniform(-3.0, 3.0, 4), np.array([1e-3, 0.49, 0.51, 40.0])
+    found = weak((axes * told**2) @ axes.T * np.outer(sizes, sizes), sizes, 2.0)
+    assert len(found) == 2
+    np.testing.assert_allclose(np.abs(found @ axes), [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]], atol=1e-6)
