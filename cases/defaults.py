@@ -84,17 +84,26 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
         yield "gap_error", 1e-6, _TOLERANCE
         yield "event_gap", 1.0, _ON_THE_GRID
         yield "complementarity", 1e-6, "contacts only push, to the precision of the instant of release"
-        yield "event_times", 1e-6, _TOLERANCE
-        yield "mode_times", 1e-6, _TOLERANCE
+        yield "event_times", shortest(case.t_end), _TOLERANCE
+        yield "mode_times", shortest(case.t_end), _TOLERANCE
         yield "touch_count", 0.0, _COUNT
         yield "release_count", 0.0, _COUNT
     if case.rubs:
-        yield "stick_times", 1e-6, _TOLERANCE
-        yield "slip_times", 1e-6, _TOLERANCE
+        yield "stick_times", shortest(case.t_end), _TOLERANCE
+        yield "slip_times", shortest(case.t_end), _TOLERANCE
         yield "cone_violation", 1e-6, "friction is at most mu times the normal force, to the error of sticking rows"
         yield "friction_angle", 1e-6, "friction opposes the slip, to the precision of its direction"
     if (~case.law.unilateral & (case.law.a0 > 0.0)).any():
         yield "constraint_drift", 1e-8, "the law corrects closures at its own rate"
+
+
+SHORT, BRIEF = 1e-6, 0.1
+"""To which instants are judged, s, and the horizon below which it is as much of it less, s."""
+
+
+def shortest(t_end: float) -> float:
+    """Return how far an instant of a motion may be off, s, by its horizon, s."""
+    return SHORT * min(1.0, t_end / BRIEF)
 
 
 def limits_of(case: Case) -> tuple[Limit, ...]:

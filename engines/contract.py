@@ -68,6 +68,9 @@ class Engine(ABC):
             not named here it must show: the parity audit and the metrics count what is missing as wrong.
         orders: profile -> promised order of the error in its step `dt` or its tolerance `rtol`;
             the benchmark holds the observed one against it.
+        steps: profile whose known deviations hide what it applies -> theta: a step of its setting `dt` moves by
+            dt (v + theta (v+ - v)); NaN without such steps. Those that it takes first, accelerations, friction
+            and the setting `restitution` are held against the law's (`crossbody.reports.judging.first_steps`).
         of_scenes: profile -> the one that stands for it in a scene, a robot's file say, where all
             profiles are meant.
         interpreted: profile ("*" for all) -> what of its timed runs is Python, which the
@@ -79,6 +82,7 @@ class Engine(ABC):
     versions: Mapping[str, str]
     hidden: Mapping[str, Mapping[str, str]] = NOTHING
     orders: Mapping[str, float] = NOTHING
+    steps: Mapping[str, float] = NOTHING
     of_scenes: Mapping[str, str] = NOTHING
     interpreted: Mapping[str, str] = NOTHING
 

@@ -42,6 +42,7 @@ class Model:
         sensors: coordinates and rates of every body, then the force of every row.
         masses: read back from it.
         laws: the symbolic law of every row; empty for plain connectors.
+        rows: numbers of the connectors.
     """
 
     mbs: Any
@@ -49,6 +50,7 @@ class Model:
     sensors: tuple[list[Any], list[Any], list[Any]]
     masses: list[float]
     laws: list[Any]
+    rows: list[Any]
 
 
 def _law(scene: Line, row: int) -> Law:
@@ -109,7 +111,15 @@ def _build(scene: Line, symbolic: bool) -> Model:
     ]
     mbs.Assemble()
     masses = [float(mbs.GetObjectParameter(body, "mass")) for body in bodies]
-    return Model(mbs=mbs, held=(container, *laws), sensors=(q, v, lam), masses=masses, laws=laws)
+    return Model(mbs=mbs, held=(container, *laws), sensors=(q, v, lam), masses=masses, laws=laws, rows=rows)
+
+
+def _springs(model: Model) -> dict[str, str]:
+    """Return stiffness, N/m, and damping, N s/m, of the connectors, read back; each of them once."""
+    read = model.mbs.GetObject
+    names = ("limitStopsStiffness", "limitStopsDamping"), ("stiffness", "damping")
+    found = {tuple(read(row).get(one, read(row)[two]) for one, two in zip(*names, strict=True)) for row in model.rows}
+    return {"springs": ",".join("/".join(f"{x:.6g}" for x in one) for one in sorted(found))}
 
 
 def _simulation(case: Case, used: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -210,6 +220,7 @@ class Exudyn(Engine):
     hidden = HIDDEN
     versions: Mapping[str, str] = {"exudyn": version("exudyn")}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    steps: Mapping[str, float] = {"default": 0.5}
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Cases that are not of bodies on a line."""
@@ -227,7 +238,7 @@ class Exudyn(Engine):
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
         scene = line(case)
         model = _build(scene, symbolic=profile == "matched")
-        extra = {"law": law_name(scene)} if profile == "matched" else {"method": "GeneralizedAlpha"}
+        extra = {"law": law_name(scene)} if profile == "matched" else {"method": "GeneralizedAlpha", **_springs(model)}
         return PeerRun(
             engine=self.name, profile=profile, settings=used | extra,
             integrate=_integrator(case, scene, model, used), physics=_audit(case, scene, model),

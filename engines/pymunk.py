@@ -77,6 +77,7 @@ class Pymunk(Engine):
     hidden = HIDDEN
     versions: Mapping[str, str] = {"pymunk": pymunk.version, "Chipmunk": pymunk.chipmunk_version}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    steps: Mapping[str, float] = dict.fromkeys(profiles, 0.0)  # bodies are moved before velocities change
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Cases that are not of bodies on a line in the plane x, z, and rows that are always on."""
@@ -94,7 +95,8 @@ class Pymunk(Engine):
         step = 1e-3 if profile == "matched" else USUAL
         used = _settings.chosen(self.name, profile, settings(case, scene, step), given)
         world = World(scene, float(used["restitution"]), profile == "matched")
-        masses = [float(body.mass) for body in world.bodies]
+        masses, space = [float(body.mass) for body in world.bodies], world.space
+        used = used | {"iterations": int(space.iterations), "slop": float(space.collision_slop)}
         return stepped((self.name, profile), case, used, world, masses, -float(world.axis.dot(world.space.gravity)))
 
 

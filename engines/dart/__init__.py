@@ -106,6 +106,7 @@ class Dart(Engine):
     hidden = HIDDEN
     versions: Mapping[str, str] = {"dartpy": dartpy.__version__}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
+    steps: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Cases that are not of bodies on a line, and rows that are always on."""

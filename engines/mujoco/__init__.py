@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Parameter, Trajectory
 from crossbody.cases.files.warned import captured
@@ -87,6 +88,7 @@ class Mujoco(Engine):
     of_scenes: Mapping[str, str] = {"default": "as_is"}
     versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
     orders: Mapping[str, float] = {"matched": 4.0, "default": 1.0, "as_is": 1.0}
+    steps: Mapping[str, float] = {"default": 1.0}
     interpreted: Mapping[str, str] = {
         "matched": (
             "the loop over steps, the record, the search for events, the part of the law that solref cannot express"
@@ -134,7 +136,7 @@ class Mujoco(Engine):
             more: dict[str, Any] = {name: value for name, value in used.items() if name not in ("dt", "max_steps")}
             scene = _model.build(case, profile, float(used["dt"]), **more)
         return MujocoRun(
-            case=case, scene=scene, profile=profile, settings=used | _options(scene), said=tuple(said),
+            case=case, scene=scene, profile=profile, settings=used | _options(scene, profile), said=tuple(said),
             follows=_model.followed(case, profile), rounded="" if own else rounded,
         )  # fmt: skip
 
@@ -181,10 +183,25 @@ def _known(case: Case, step: float) -> dict[str, Parameter]:
     }
 
 
-def _options(scene: Prepared) -> dict[str, Any]:
+SOFT = ("geom_sol{}", "pair_sol{}", "jnt_sol{}", "eq_sol{}", "tendon_sol{}_lim", "dof_sol{}", "tendon_sol{}_fri")
+"""Where a model says how soft rows are: what touches, is bounded or held, and what rubs."""
+
+
+def _softness(model: Any) -> dict[str, str]:
+    """Return what rows of the obvious model follow, each law once: where it changes, stored runs are of another."""
+    kinds = {"solref": "ref", "solimp": "imp"}
+    found = {
+        name: np.unique(np.concatenate([getattr(model, of.format(kind)) for of in SOFT]).round(9) + 0.0, axis=0)
+        for name, kind in kinds.items()
+    }
+    return {name: ",".join("/".join(f"{x:.6g}" for x in row) for row in rows) for name, rows in found.items()}
+
+
+def _options(scene: Prepared, profile: str) -> dict[str, Any]:
     """What the model says about how it is solved, for provenance."""
     opt = scene.model.opt
-    return {
+    soft = _softness(scene.model) if profile == "default" else {}
+    return soft | {
         "integrator": mujoco.mjtIntegrator(opt.integrator).name.removeprefix("mjINT_"),
         "solver": mujoco.mjtSolver(opt.solver).name.removeprefix("mjSOL_"),
         "located_events": scene.arm is not None,

@@ -250,16 +250,24 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
         return
     for claim in case.claims:
         if claim.metric not in seen:
-            yield Verdict(
-                case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=claim.metric,
-                value=math.nan, expected=claim.expected, unit="", tier=claim.tier.value,
-                verdict=Word.OUTSIDE, command=command, why=f"No run was judged by the claim: {claim.source}.",
-            )  # fmt: skip
+            why = f"No run was judged by the claim: {claim.source}."
+            yield _of_truth(
+                case, f"{claim.metric} (claim)", why, command, tier=claim.tier.value, expected=claim.expected
+            )
+
+
+def _of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> Verdict:
+    """Return a row that is outside of no run: no metric has its name, so that nobody looks for one."""
+    return Verdict(
+        case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=metric, unit="", verdict=Word.OUTSIDE,
+        command=command, why=why, **({"value": math.nan} | more),
+    )  # fmt: skip
 
 
 def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
     from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
+    from crossbody.reports.judging.planted import PART
 
     near = _Judge(case, JUDGED, truth, command)
     far = _Judge(case, JUDGED, replace(truth, grows=FAR), command)
@@ -267,8 +275,9 @@ def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
 
     def outside(name: str, value: float) -> bool:
         rows = [near.judged(name, off, "", truth, 1.0) for off in (value, -value)]
-        if metrics.load(name).UNIT == "1" and near.longer == 1.0:  # other units have caps in their own
-            rows.append(far.judged(name, value, "", truth, 1.0))
+        unit = metrics.load(name).UNIT
+        if unit in ("1", "s") and near.longer == 1.0:  # other units have caps in their own
+            rows.append(far.judged(name, value if unit == "1" else PART * case.t_end, "", truth, 1.0))
         if name == "position" and not math.isnan(truth.allowed):  # another source that is off so much is no witness
             rows += truth_row(case, replace(truth, agreement={name: value}), command)
         return all(row.verdict == Word.OUTSIDE for row in rows) or _lets_pass(case, name, value)
@@ -278,10 +287,7 @@ def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
             why = f"A control passes: {fault} is no number outside."
         else:
             why = f"A control is not seen as it is: {fault} must come out between {least:.3g} and {most:.3g}."
-        yield Verdict(
-            case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=f"{name} (control)", value=value,
-            unit="", tier=truth.tier.value, verdict=Word.OUTSIDE, command=command, why=why,
-        )  # fmt: skip
+        yield _of_truth(case, f"{name} (control)", why, command, tier=truth.tier.value, value=value)
 
 
 def _unruled(case: Case) -> Iterator[Blind]:
@@ -316,6 +322,11 @@ def longer(case: Case) -> float:
     return max(case.t_end / own, 1.0)
 
 
+def _unit(metric: str, case: Case) -> float:
+    """Return what the largest errors of a metric are parts of: 1, or of instants the horizon where it is shorter, s."""
+    return min(case.t_end, 1.0) if "_times" in metric else 1.0
+
+
 class _Judge:
     """Fills in what all rows of one run share."""
 
@@ -346,7 +357,7 @@ class _Judge:
         why += f"; the horizon is {longer:.3g} times the case's own" if longer > 1.0 else ""
         why += f"; {self.looser:.3g} times that tolerance was requested" if looser > 1.0 else ""
         claim = self.claims.get(metric)
-        widest = WIDEST * (abs(claim.expected) if claim is not None and claim.expected else 1.0)
+        widest = WIDEST * (abs(claim.expected) if claim is not None and claim.expected else _unit(metric, self.case))
         return replace(found, value=max(found.value, min(found.value * times, widest)), why=why)
 
     def hides(self) -> bool:

@@ -9,10 +9,10 @@ import numpy as np
 from crossbody.cases import Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
+from crossbody.cases.defaults import shortest
 from crossbody.cases.remembered import remembered
 from crossbody.reports.measuring.truth import Truth, taken
 
-SHORT = 1e-6  # s, to which instants of events are judged, as by `crossbody.cases.defaults`
 BEFORE = 0.5 ** np.arange(24.0)
 """Instants before an event of the truth, as parts of how far the run's is off: also short slides lie between two."""
 
@@ -21,7 +21,7 @@ def off(truth: Truth, expected: float, found: float, guard: Callable[[Trajectory
     """Return how far an event is off, s, or what its guard makes of that, where it says no more.
 
     An event is where its guard, a gap, a slip or a force, reaches zero. If the truth's is within what it is known
-    to for as long before its own event as the run is off, that counts as the same part of `SHORT`.
+    to for as long before its own event as the run is off, that counts as the same part of what instants may be off by.
 
     Args:
         truth: with how errors grow, as the limits on them do.
@@ -30,8 +30,8 @@ def off(truth: Truth, expected: float, found: float, guard: Callable[[Trajectory
         guard: values (n,) at the samples of a motion.
         known: by how much the guard of a run may be off, in its unit.
     """
-    late = abs(found - expected)
-    if not late > SHORT:
+    late, short = abs(found - expected), shortest(float(truth.trajectory.t[-1]))
+    if not late > short:
         return late
     times = truth.trajectory.t
     first = int(np.searchsorted(times, expected - late))
@@ -41,7 +41,7 @@ def off(truth: Truth, expected: float, found: float, guard: Callable[[Trajectory
             return late
     near = _dense(truth.trajectory)(np.maximum(expected - late * BEFORE, truth.trajectory.t[0]))
     part = float(np.max(np.abs(guard(near)))) / known if known > 0.0 else np.inf
-    return SHORT * part if part <= truth.grows else late
+    return short * part if part <= truth.grows else late
 
 
 @remembered(4)

@@ -19,6 +19,7 @@ from crossbody.reference.compiling import count
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
 from crossbody.reports.judging.covered import covered
+from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.parts import RATIO, Study
 from crossbody.reports.judging.reach import BUDGET, estimated, followed
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
@@ -178,6 +179,8 @@ def _ran(
     shown = _of_engine(pick, "audit", prepared.audit(), Mapping, "a mapping")  # type: ignore[type-abstract]
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
+    own = {name: value for name, value in asked.items() if name in prepared.settings}
+    rows += first_steps(case, (engines.load(pick.engine), prepared.profile), prepared.settings, own, rows, reference)
     began = process_time()
     natural = _of_case(case, pick, prepared.run())
     if bounded and natural.outcome is Outcome.TIME_LIMIT:

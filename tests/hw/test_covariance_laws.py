@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.linalg import block_diag, toeplitz
 
 from crossbody.hw.fitting.covariance import Layout, _contributions, noise_correlation, scatter
+from crossbody.hw.fitting.difference import Differences
 from crossbody.hw.fitting.doubts import agreement
+from crossbody.hw.fitting.information import information, weak
 
 LAYOUTS = (
     Layout(samples=(40,), k=1), Layout(samples=(25, 31), k=2), Layout(samples=(30,) * 5, k=1),
@@ -65,6 +68,7 @@ def test_estimates_scatter_together_as_the_noise_goes_through_their_weights(layo
     for correlation in (0.0, 0.7):
         Q, L, residual = drawn(seed, layout, correlation)
         found, smaller = scatter(Q, L, residual, layout), scatter(Q, 1e-3 * L, residual, layout)
+        np.testing.assert_allclose(found.half, stats.t.ppf(0.975, found.freedom) * found.std)  # 95 % on both sides
         assert smaller.freedom == pytest.approx(found.freedom, rel=1e-9), "units of estimates tell nothing"
         assert smaller.half == pytest.approx(1e-3 * found.half, rel=1e-9)
         if layout.overlap:
@@ -105,3 +109,42 @@ def test_halves_are_compared_in_what_both_of_them_tell(seed: int) -> None:
             weights = np.linalg.pinv(J[rows])
             assert value == pytest.approx((weights @ residual[rows])[i], abs=1e-9)
             assert std == pytest.approx(np.linalg.norm(weights[i]), rel=0.5)  # of noise of size 1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_weights_of_residuals_are_the_pseudoinverse_whatever_the_unknowns_sizes(seed: int) -> None:
+    """And the basis is of what the unknowns can change: sizes only say what is told apart from nothing."""
+    random = np.random.default_rng(seed)
+    sizes = 10.0 ** random.uniform(-3.0, 3.0, 4)
+    J = random.normal(size=(30, 4)) / sizes
+    told = information(J, sizes)
+    np.testing.assert_allclose(told.weights.T * sizes[:, None] ** -1, np.linalg.pinv(J * sizes), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(told.basis @ told.basis.T @ J, J, rtol=1e-9)
+
+
+def test_central_differences_are_held_against_those_at_half_their_step() -> None:
+    """Of x^3 the one is 3 x^2 + h^2, the other 3 x^2 + h^2/4: they tell each other's error."""
+
+    class Cubes(Differences):
+        def __init__(self) -> None:
+            self.free = ("a", "b")
+
+        def residual(self, x: np.ndarray) -> np.ndarray:
+            return np.array([x[0] ** 3, 0.0, x[1]])
+
+    x, h = np.array([2.0, 5.0]), 0.1 * 2.0
+    J = Cubes().jacobian(x)
+    np.testing.assert_allclose(J, [[3.0 * x[0] ** 2 + h**2, 0.0], [0.0, 0.0], [0.0, 1.0]], rtol=1e-12)
+    found = Cubes().checked(x, J, x, np.zeros(2))
+    assert found == pytest.approx(0.75 * h**2 / (3.0 * x[0] ** 2 + h**2))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_directions_are_weak_that_may_be_as_large_as_the_unknowns(seed: int) -> None:
+    """Of relative changes with known deviations along axes at random: those of 1 and more within the interval."""
+    random = np.random.default_rng(seed)
+    axes = np.linalg.qr(random.normal(size=(4, 4)))[0]
+    sizes, told = 10.0 ** random.uniform(-3.0, 3.0, 4), np.array([1e-3, 0.49, 0.51, 40.0])
+    found = weak((axes * told**2) @ axes.T * np.outer(sizes, sizes), sizes, 2.0)
+    assert len(found) == 2
+    np.testing.assert_allclose(np.abs(found @ axes), [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]], atol=1e-6)

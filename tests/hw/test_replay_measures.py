@@ -13,7 +13,7 @@ from crossbody.hw.replaying import measures as _measures
 from crossbody.hw.replaying import tracked
 from crossbody.hw.replaying.sensors import lagged
 from crossbody.hw.windows.rates import Impacts, derivatives, felt, impacts, least_of, matched
-from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
+from crossbody.hw.windows.whiteness import OVERSAMPLED, autocorrelation, crosscorrelation, stride_of
 
 STEP = 0.88e-3
 
@@ -236,3 +236,24 @@ def test_what_no_noise_and_no_weight_is_an_impact(seed: int, pull: float) -> Non
     assert least_of(t, y) == pytest.approx(max(clear, 0.25 * pull), rel=0.1)
     hit = 100.0 * clear
     assert least_of(t, y + hit * STEP * np.maximum(t - t[900], 0.0)) == pytest.approx(0.25 * (hit + pull), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_correlations_at_lags_are_those_of_the_samples_that_both_have_there(seed: int) -> None:
+    """Of windows whose size changes along them, counted sample by sample."""
+    random = np.random.default_rng(seed)
+    lengths, most = random.integers(9, 30, 3), 5
+    a, b = ([random.standard_normal(n) * np.exp(3.0 * np.arange(n) / n) for n in lengths] for _ in range(2))
+    lags, rho = _measures._lagged(a, b, most)
+    for lag, found in zip(lags, rho, strict=True):
+        pairs = [(x[i + lag], y[i]) for x, y in zip(a, b, strict=True) for i in range(len(y)) if 0 <= i + lag < len(x)]
+        x, y = np.array(pairs).T
+        assert found == pytest.approx(x @ y / np.sqrt((x @ x) * (y @ y)), abs=1e-12)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01, 0.02])
+def test_what_moves_is_told_from_its_noise_where_residuals_are_averaged(noise: float) -> None:
+    """A period of 200 samples is one whatever noise its differences have."""
+    draw = np.random.default_rng(5)
+    y = np.sin(2.0 * np.pi * np.arange(200_000) / 200.0) + noise * draw.standard_normal(200_000)
+    assert stride_of(y, noise) == pytest.approx(200.0 / OVERSAMPLED, abs=1.0, rel=0.05)

@@ -16,7 +16,7 @@ from crossbody.hw.windows import rates
 from crossbody.hw.windows.rates import derivatives, rates_by_fit
 from crossbody.hw.windows.turns import advanced, deviation, difference, increments, way
 from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation
-from crossbody.hw.windows.window import FEWEST, overlap, windows
+from crossbody.hw.windows.window import FEWEST, overlap, recorded_inputs, windows
 
 STEP = 0.01
 
@@ -216,3 +216,19 @@ def test_correlations_are_sums_of_products_inside_windows(seed: int) -> None:
     beside = crosscorrelation(felt, inputs, 8)
     assert beside.values[beside.lags == late] == pytest.approx(gain, abs=0.1)
     assert np.abs(beside.values[beside.lags != late]).max() < 0.2
+
+
+@pytest.mark.parametrize("late", [0, 1, 7])
+@pytest.mark.parametrize("part", [0.0, 0.4])
+def test_an_input_is_in_force_from_when_it_was_true(late: int, part: float) -> None:
+    """A value that is read some samples late was true so long before; between two samples the one before is."""
+    random = np.random.default_rng(late)
+    log, model = recorded(random), hw.models.load("double_pendulum")
+    delay, u = (late + part) * STEP, log.matrix("inputs")
+    log = replace(
+        log, channels=tuple(replace(one, delay=delay) if one.role == "inputs" else one for one in log.channels)
+    )  # fmt: skip
+    t = log.time
+    rows = [max([k for k in range(len(t)) if t[k] - delay <= now + 1e-6 * STEP], default=0) for now in t]
+    np.testing.assert_array_equal(recorded_inputs(log, model), u[rows])
+    assert late == 0 or (np.array(rows) > np.arange(len(t)))[: -late - 1].any()

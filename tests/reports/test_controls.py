@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +13,8 @@ import pytest
 from random_scenes import random_scene, random_state, with_own_laws
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Limit
+from crossbody.cases import Case, Claim, Limit, Tier
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
 from crossbody.reports.judging import audit, comparison, controls, planted, verdict
 from crossbody.reports.judging.comparison import judged
@@ -21,6 +23,9 @@ from crossbody.reports.judging.reach import followed
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, shortened, taken
+from crossbody.reports.pages import site
+from crossbody.reports.runs import jobs, study
+from crossbody.reports.runs.output import folder
 
 LABELS = (
     ("bouncing_ball", "elastic"), ("red_body", "resolved"), ("soft_contact", "delta"), ("sliding_block", "flat"),
@@ -157,3 +162,36 @@ def test_without_the_reference_its_audit_is_not_asked_and_a_metric_that_throws_s
     monkeypatch.setattr(engines, "names", lambda: ("mujoco",))
     assert list(unheard(BALL)) == []
     assert [row.metric for row in blind(BALL, TRUTH)] == []
+
+
+def test_rows_of_the_truth_have_no_name_of_a_metric_and_stand_on_a_page(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A claim that judged nothing, and a blind metric: a page that looks for a metric finds runs alone."""
+    claim = Claim(metric="largest position (step)", expected=0.0, tier=Tier.A, source="nobody")
+    monkeypatch.setattr(metrics.load("velocity"), "measure", lambda *given: 0.0)
+    case = replace(BALL, name="my_ball", claims=(claim,))
+    entry = comparison._entry(engines.load("reference").prepare(case, "compiled"))
+    result = jobs.CaseResult(case=case, truth=TRUTH, entries=(entry,))
+    rows = study.judge([result], {case.label: "again"})
+    mine = [row["metric"] for row in rows if row["engine"] == "truth" and row["metric"] != "truth"]
+    assert set(mine) == {"largest position (step) (claim)", "velocity (control)"}
+    assert not set(mine) & {*metrics.of(case), *comparison.LARGEST_PARTS}
+    with folder(tmp_path / "out") as out:
+        study.write(out, [result], rows, {"command": "crossbody run", "time": ""})
+        site.write(out)
+    assert "velocity (control)" in (tmp_path / "out" / f"case-{case.label.replace(':', '.')}.html").read_text()
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_faults_are_seen_in_whatever_unit_of_time_a_motion_is_fast(unit: float) -> None:
+    """A limit of a microsecond says nothing of a motion of some."""
+    law = RowLaw(a0=1e4 / unit**2, a1=20.0 / unit)
+    height = Joint(name="height", body="ball", type="slide", range=(0.0, math.inf), law=law)
+    scene = Scene(bodies=(Body(name="ball", mass=1.0),), joints=(height,), gravity=(0.0, 0.0, -9.81 / unit**2))
+    case = cases.from_scene(scene, q0=[1.0], t_end=1.5 * unit)
+    truth = truth_of(case)
+    assert truth.trajectory.outcome.ok
+    assert blind(case, truth) == []
+    judge_ = comparison._Judge(case, comparison.JUDGED, replace(truth, grows=1e12), "")
+    assert judge_.judged("event_times", 0.01 * case.t_end, "s", truth, 1.0).verdict == Word.OUTSIDE
