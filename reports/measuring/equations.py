@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, CaseUnsupported, Trajectory
 from crossbody.cases.remembered import remembered
-from crossbody.engines.equations import system_of
 
 if TYPE_CHECKING:
     from crossbody.reference import System
@@ -20,6 +19,8 @@ SAMPLES = 400
 @remembered(4)
 def equations(case: Case) -> System | None:
     """The mechanism with the law of its rows; None where the reference has none."""
+    from crossbody.engines.equations import system_of  # numba, which a page does without
+
     try:
         return system_of(case)
     except CaseUnsupported:
