@@ -182,10 +182,9 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 @compiled
 def _sticks_too_hard(s: Any, m: Model, w: Work, b: Buffers) -> bool:
     """Whether a contact sticks by more than its bound though nothing has fired; it marks that."""
-    i, marks = cones.beyond_bound(s, m, w), b.history[len(b.history) - 1]
+    i = cones.beyond_bound(s, m, w)
     if i >= 0:
-        marks[:] = 0
-        marks[i] = 1
+        journal.blame(b, i)
     return bool(i >= 0)
 
 

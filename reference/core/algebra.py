@@ -81,14 +81,19 @@ def solve_mass(L: Floats, x: Array, above: Index, k: int, first: int, last: int)
 
 
 @compiled
+def _subtract_row(X: Floats, a: int, part: float, b: int, count: int) -> None:
+    """Row a of X less `part` times its row b, in the first `count` columns."""
+    for j in range(count):
+        X[a, j] -= part * X[b, j]
+
+
+@compiled
 def solve_columns(L: Floats, X: Floats, above: Index, n: int, count: int) -> None:
     """X := M^-1 X, in place, for the first `count` columns of X and a mass matrix that is one block."""
     for i in range(n - 1, -1, -1):
         c = above[i]
         while c >= 0:
-            part = L[i, c]
-            for j in range(count):
-                X[c, j] -= part * X[i, j]
+            _subtract_row(X, c, L[i, c], i, count)
             c = above[c]
     for i in range(n):
         part = L[i, i]
@@ -96,9 +101,7 @@ def solve_columns(L: Floats, X: Floats, above: Index, n: int, count: int) -> Non
             X[i, j] *= part
         c = above[i]
         while c >= 0:
-            part = L[i, c]
-            for j in range(count):
-                X[i, j] -= part * X[c, j]
+            _subtract_row(X, i, L[i, c], c, count)
             c = above[c]
 
 

@@ -14,6 +14,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, pushed, weigh
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.friction import is_shared
+from crossbody.reference.core.journal import blame
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
 from crossbody.reference.core.loops import bears_nothing
 from crossbody.reference.kinds import Bytes
@@ -67,9 +68,7 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
             continue
         weigh(s, m, w, w.la)
         if not missing <= WRONG * (w.scale[j] + pushed(m, w, j)) + 64.0 * rounding:
-            marks = b.history[len(b.history) - 1]
-            marks[:] = 0
-            marks[w.idx[j]] = 1
+            blame(b, w.idx[j])
             return False
     return True
 

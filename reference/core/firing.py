@@ -9,7 +9,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import events, guards, journal, settle
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, scatter
-from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, NOTHING, WAY_TO_REST, ask, has_friction, is_dry
+from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, DIES_INTO_JAM, NOTHING, ask, has_friction, is_dry
 from crossbody.reference.core.layout import (
     BALLISTIC,
     FREE,
@@ -24,7 +24,7 @@ from crossbody.reference.core.layout import (
     Work,
 )
 from crossbody.reference.core.machine import active_mode
-from crossbody.reference.core.stops import JAMS, STOPS
+from crossbody.reference.core.stops import presses_alone
 from crossbody.reference.kernels import LOST as IS_LOST
 
 JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
@@ -38,10 +38,10 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.jam = s.frictional and _slip_or_jam(K, s, m, w, b)
     if s.frictional and s.standing > STANDSTILL + s.nc:  # ever sooner before a jam: what goes on is clear of it
         s.jam = s.jam or jams(K, s, m, w, b)
-    meets = _way_to_rest(K, s, m, w, b) if s.frictional else STOPS
-    if meets == JAMS and _presses_alone(s, m, w, b):
-        return PAINLEVE
-    s.jam = s.jam or meets == JAMS  # others may go on without it, and no law says which
+    if s.frictional and _stops_in_a_jam(K, s, m, w, b):
+        if presses_alone(s, m, w):
+            return PAINLEVE
+        s.jam = True  # others may go on without it, and no law says which
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             after = events.after(s, m, w, b.mode, i, w.gap[i])
@@ -101,30 +101,19 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 
 @compiled
-def _way_to_rest(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """What a contact whose slip comes to its end meets first, too slow for any step to see; it marks one that jams."""
-    nq, known, marks = s.nq, False, b.history[len(b.history) - 1]
+def _stops_in_a_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
+    """Whether a contact whose slip comes to its end jams first, too slow for any step to see; it marks this one."""
+    nq, known = s.nq, False
     for i in range(s.nc):
         if not (w.hit[i] <= s.theta and m.tangents[i] > 1 and events.stops(s, m, w, i)):
             continue
         if not known and accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[:nq], w.y[nq:], GENERAL) != 0:
-            return int(STOPS)
+            return False
         known = True
-        if ask(WAY_TO_REST, s, m, w, i) == JAMS:
-            marks[:] = 0
-            marks[i] = 1
-            return int(JAMS)
-    return int(STOPS)
-
-
-@compiled
-def _presses_alone(s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Whether no contact presses but one."""
-    pressing = 0
-    for j in range(s.na):
-        i = w.idx[j]
-        pressing += m.unilateral[i] and m.follows[i] < 0 and b.mode[i] != FREE
-    return pressing == 1
+        if ask(DIES_INTO_JAM, s, m, w, i) > 0.0:
+            journal.blame(b, i)
+            return True
+    return False
 
 
 @compiled

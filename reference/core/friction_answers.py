@@ -22,6 +22,7 @@ from crossbody.reference.core.friction import (
     BEGIN_SLIP,
     DECIDE,
     DETERMINANT,
+    DIES_INTO_JAM,
     FACTOR,
     HOLDS_ON,
     JAMS,
@@ -35,7 +36,6 @@ from crossbody.reference.core.friction import (
     TURNING_RATE,
     TURNS_ASIDE,
     WATCH,
-    WAY_TO_REST,
     slip,
     small_slip,
 )
@@ -80,7 +80,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     BEGIN_SLIP      of contacts that have reached their bounds, there
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
     JAMS            how far the contact that slides nearest to a jam is from it; that of each into w.cones[i]
-    WAY_TO_REST     what contact i, whose slip dies out, meets before it is at rest, as `stops` names it
+    DIES_INTO_JAM   1 if contact i, whose slip dies out, jams before it is at rest; what lets go on the way does so
     SETTLED         follow what the law leaves open, where modes have settled
     """
     if what == FACTOR:
@@ -120,8 +120,8 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         return float(sticking.decide(s, m, w))
     elif what == SETTLED:
         undetermined.follow_shares(s, m, w, True)
-    elif what == WAY_TO_REST:
-        return float(stops.way_to_rest(s, m, w, i))
+    elif what == DIES_INTO_JAM:
+        return 1.0 if stops.dies_into_jam(s, m, w, i) else 0.0
     elif what == JAMS:
         return float(jams.watch(s, m, w, w.cones[i]))
     elif what == BEGIN:

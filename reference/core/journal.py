@@ -42,6 +42,14 @@ def change(s: Any, b: Buffers, i: int, after: int) -> None:
 
 
 @compiled
+def blame(b: Buffers, i: int) -> None:
+    """Mark row i alone in the last line of the history, for the message of a run that ends."""
+    marks = b.history[len(b.history) - 1]
+    marks[:] = 0
+    marks[i] = 1
+
+
+@compiled
 def remember(s: Any, b: Buffers) -> bool:
     """Note the mode set; whether it stood here at this instant before."""
     if abs(s.t - s.history_t) > 8.0 * ULP * abs(s.t):

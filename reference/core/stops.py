@@ -16,7 +16,6 @@ from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.core.mode_set import aside, exceed
 from crossbody.reference.core.slips import CLEAR, angle
 
-STOPS, JAMS, LETS_GO = np.arange(3)
 PARTS, HALVINGS = 48, 40  # of a full turn that are looked at, and between two of these
 
 
@@ -88,10 +87,20 @@ def _may_jam(s: Any, m: Model, w: Work, i: int) -> bool:
 
 
 @compiled
-def _way_to_rest(s: Any, m: Model, w: Work, i: int) -> int:
-    """What the slip of contact i meets while it turns into a direction that it keeps: STOPS, JAMS or LETS_GO.
+def _jams_where_barred(s: Any, m: Model, w: Work, i: int, at: float) -> bool:
+    """Whether contact i jams at an angle behind which it has no acceleration of its set; one that lets go does so."""
+    if _distance(s, m, w, i, at) <= 0.0:
+        return True
+    respond(s, m, w, w.pushed, w.la)
+    k = _pulling(s, m, w)
+    if k >= 0 and not _breaks_away(s, m, w):
+        w.hit[k], w.kind[k] = s.theta, RELEASE
+    return False
 
-    Another contact that lets go on the way does so here.
+
+@compiled
+def _turns_into_jam(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether the slip of contact i turns into a direction in which it jams before it comes to one that it keeps.
 
     Near zero it obeys z' = a(z / |z|), all else as it stands: its direction follows the part of a across it, at a rate
     that goes as 1/|z|, and the way that it takes is the same however small it is.
@@ -99,7 +108,7 @@ def _way_to_rest(s: Any, m: Model, w: Work, i: int) -> int:
     low = _last_clear(s, m, w, i)
     across = _across(s, m, w, i, low)
     if np.isnan(across):
-        return int(STOPS)  # the step has not come this way
+        return False  # the step has not come this way
     turn = np.copysign(2.0 * np.pi / PARTS, across)
     for _ in range(PARTS):
         high = low + turn
@@ -111,48 +120,42 @@ def _way_to_rest(s: Any, m: Model, w: Work, i: int) -> int:
             if np.isnan(now):
                 high = middle
             elif now * across <= 0.0:
-                return int(STOPS)
+                return False
             else:
                 low = middle
         if barred:
-            if _distance(s, m, w, i, high) <= 0.0:
-                return int(JAMS)
-            respond(s, m, w, w.pushed, w.la)
-            k = _pulling(s, m, w)
-            if k >= 0 and not _breaks_away(s, m, w):
-                w.hit[k], w.kind[k] = s.theta, RELEASE
-                return int(LETS_GO)
-            return int(STOPS)
+            return bool(_jams_where_barred(s, m, w, i, high))
         if now * across <= 0.0:
-            return int(STOPS)
+            return False
         low = high
-    return int(STOPS)
+    return False
 
 
 @compiled
-def _several_press(s: Any, m: Model, w: Work) -> bool:
-    """Whether more than one contact presses, of which another may let go."""
+def presses_alone(s: Any, m: Model, w: Work) -> bool:
+    """Whether no contact presses but one, of the rows in contact as evaluated."""
     pressing = 0
     for j in range(s.na):
         pressing += m.unilateral[w.idx[j]] and m.follows[w.idx[j]] < 0
-    return bool(pressing > 1)
+    return bool(pressing == 1)
 
 
 @compiled
-def way_to_rest(s: Any, m: Model, w: Work, i: int) -> int:
-    """What contact i, whose slip dies out at the present instant as evaluated, meets before it is at rest."""
+def dies_into_jam(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether contact i, whose slip dies out at the present instant as evaluated, jams before it is at rest.
+
+    Another contact that lets go on the way does so here.
+    """
     if is_dry(m, i) or m.tangents[i] == 1 or has_begun(w, i) or not w.slides[i]:
-        return int(STOPS)
+        return False
     for j in range(s.na):
         k = w.idx[j]
         slides = has_friction(m, k) and w.slides[k] and not is_dry(m, k)
         if k != i and slides and slip(m, w, k, w.rate) <= small_slip(s):
-            return int(STOPS)  # several turn together
+            return False  # several turn together
     c = w.listed[m.tangent[i]]
     x, y = w.along[c], w.along[c + 1]
-    meets = STOPS
-    if _several_press(s, m, w) or _may_jam(s, m, w, i):
-        meets = _way_to_rest(s, m, w, i)
+    jams = (_may_jam(s, m, w, i) or not presses_alone(s, m, w)) and _turns_into_jam(s, m, w, i)
     w.along[c], w.along[c + 1] = x, y
     factor_as_held(s, m, w)
-    return int(meets)
+    return bool(jams)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from friction_scenes import pair
 
 from crossbody.cases import Outcome
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene, Shape
 from crossbody.reference import simulate
 from crossbody.reference.tree.system import system
 
@@ -24,10 +25,7 @@ def groove(seed: int) -> tuple[Scene, np.ndarray, np.ndarray]:
           for name, sign in (("left", 1.0), ("right", -1.0))),
         Shape(name="ball", body="ball", type="sphere", size=(RADIUS, 0, 0)),
     )  # fmt: skip
-    pairs = tuple(
-        Pair(name=name, first=name, second="ball", friction=(float(mu), float(mu), 0, 0, 0), dimension=3, law=law)
-        for name, mu in zip(("left", "right"), frictions, strict=True)
-    )
+    pairs = tuple(pair(name, "ball", float(mu), law) for name, mu in zip(("left", "right"), frictions, strict=True))
     mass = float(rng.uniform(0.5, 2.0))
     body = Body(name="ball", mass=mass, inertia=(*(0.4 * mass * RADIUS**2,) * 3, 0, 0, 0))
     scene = Scene(

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from friction_scenes import PLANAR, pair
 from mode_enumeration import Contact, enumerated
 
 from crossbody import cases
 from crossbody.cases import Mode, Outcome
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene, Shape
 from crossbody.reference import simulate
 from crossbody.reference.sundials.equations import Equations
 from crossbody.reference.sundials.sliding import Sliding
@@ -67,14 +68,9 @@ def cornered(seed: int) -> tuple[Scene, np.ndarray, np.ndarray]:
         Shape(name="floor", type="plane"), Shape(name="wall", type="plane", orientation=upright),
         Shape(name="box", body="box", type="box", size=(long, 0.12, high)),
     )  # fmt: skip
-    pairs = tuple(
-        Pair(name=name, first=name, second="box", friction=(mu, mu, 0, 0, 0), dimension=3, law=law)
-        for name, mu in zip(("floor", "wall"), rng.uniform(0.2, 1.5, size=2).tolist(), strict=True)
-    )
-    joints = (
-        Joint(name="x", body="box", type="slide", axis=(1, 0, 0)), Joint(name="z", body="box", type="slide"),
-        Joint(name="turn", body="box", type="hinge", axis=(0, 1, 0)),
-    )  # fmt: skip
+    frictions = rng.uniform(0.2, 1.5, size=2).tolist()
+    pairs = tuple(pair(name, "box", mu, law) for name, mu in zip(("floor", "wall"), frictions, strict=True))
+    joints = tuple(Joint(name=name, body="box", type=kind, axis=axis) for name, axis, kind in PLANAR)
     scene = Scene(
         bodies=(Body(name="box", mass=1.0, inertia=(0.008, 0.01, 0.012, 0, 0, 0)),), joints=joints, shapes=shapes,
         pairs=pairs,
