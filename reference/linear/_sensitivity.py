@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -14,6 +15,7 @@ from scipy.integrate import solve_ivp
 
 from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.entry_points import checked_arguments
+from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
@@ -77,8 +79,9 @@ class Sensitivity:
         by_parameters (2 n, k): derivative by the parameters.
         names: of the parameters.
         jumps: the events that were passed.
-        outcome: that of the run; ILL_POSED if an event is only grazed, where the derivative does not exist.
-        message: that of the run, or what is grazed, and when.
+        outcome: that of the run; ILL_POSED if an event is only grazed, where the derivative does not exist;
+            TIME_LIMIT if the derivatives took longer than asked.
+        message: that of the run, or what is grazed or took so long, and when.
     """
 
     run: Trajectory
@@ -101,7 +104,7 @@ class Sensitivity:
 def sensitivity(
     system: System, q0: ArrayLike, v0: ArrayLike, t_end: float, *,
     parameters: Sequence[str] = (), u: ArrayLike | None = None, rtol: float = 1e-11,
-    collisions: str = "sequential", max_steps: int = 1_000_000,
+    collisions: str = "sequential", max_steps: int = 1_000_000, time_limit: float = math.inf,
 ) -> Sensitivity:  # fmt: skip
     """Integrate a motion with its variational equations; every event multiplies them by its saltation matrix.
 
@@ -122,6 +125,7 @@ def sensitivity(
         rtol: tolerance of the motion and of its derivatives.
         collisions: rule for several contacts; under "simultaneous" one collision at a time only.
         max_steps: bound on the steps of the motion.
+        time_limit: bound on processor time, s, of the motion and again of its derivatives.
 
     Raises:
         SceneError: for a sampled controller, a motion that switches discrete variables, rows that
@@ -133,12 +137,13 @@ def sensitivity(
     if system.control is not None:
         raise SceneError("sensitivity: the system has a sampled controller; differentiate it with its inputs held.")
     run = simulate(
-        system, at.q, at.v, t_end, rtol=rtol, collisions=collisions, inputs=([0.0], [at.u]), max_steps=max_steps
-    )
+        system, at.q, at.v, t_end, rtol=rtol, collisions=collisions, inputs=([0.0], [at.u]), max_steps=max_steps,
+        time_limit=time_limit,
+    )  # fmt: skip
     if any(switch.t > 0.0 and not switch.smooth for switch in run.switches):
         raise SceneError("sensitivity: the motion switches discrete variables; end it before the first switch.")
-    walk = _Walk(at, over, rtol, run)
-    outcome, n, nq = walk.along(run, t_end) if run.outcome.ok else run.outcome, system.n, system.nq
+    walk = _Walk(at, over, rtol, run, time_limit)
+    outcome, n, nq = walk.within_time(run, t_end) if run.outcome.ok else run.outcome, system.n, system.nq
     if not outcome.ok:
         walk.S[:] = np.nan
     elif not (_same(walk.x[:nq], run.q) and _same(walk.x[nq:], run.v)):
@@ -160,11 +165,16 @@ def _same(end: Floats, motion: Floats) -> bool:
     return bool(np.abs(end - motion[-1]).max() <= SAME * np.abs(motion).max(initial=1e-300))
 
 
+class _OutOfTimeError(Exception):
+    """Processor time is spent; its argument is the time of the motion at which that was."""
+
+
 class _Walk:
     """State x (nq + n,) and its derivative S (2 n, 2 n + k) on the way through a motion."""
 
-    def __init__(self, at: Point, over: Theta, rtol: float, run: Trajectory) -> None:
+    def __init__(self, at: Point, over: Theta, rtol: float, run: Trajectory, time_limit: float) -> None:
         system, n = at.system, at.system.n
+        self.elapsed, self.time_limit = Elapsed(), time_limit
         self.at, self.over, self.rtol, self.run = at, over, rtol, run
         self.x = np.concatenate([at.q, at.v])
         self.S = np.hstack([np.eye(2 * n), np.zeros((2 * n, len(over.names)))])
@@ -176,6 +186,14 @@ class _Walk:
             system=system, over=over, run=run, place=_placed, slipped=slipped, still=still,
             speed=float(slipped.max(initial=0.0)) or 1.0,
         )  # fmt: skip
+
+    def within_time(self, run: Trajectory, t_end: float) -> Outcome:
+        """Go to the end, or as far as the time suffices; how it ended."""
+        try:
+            return self.along(run, t_end)
+        except _OutOfTimeError as late:
+            self.message = f"The derivatives took {self.time_limit:g} s up to t = {late.args[0]:.9g} s (time_limit)."
+            return Outcome.TIME_LIMIT
 
     def along(self, run: Trajectory, t_end: float) -> Outcome:
         """Go to the end; FINISHED, or how the derivative was lost."""
@@ -248,6 +266,8 @@ class _Walk:
         n, nq = system.n, system.nq
 
         def rate(t: float, y: Floats) -> Floats:
+            if self.elapsed.exceeds(self.time_limit):
+                raise _OutOfTimeError(t)
             moved, lost = _placed(here, t, y), np.full(len(y), np.nan)
             if not np.isfinite(y).all():
                 return lost

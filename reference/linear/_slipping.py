@@ -39,6 +39,7 @@ SHORT = 1e-2  # part of the largest slip from its start to its end, where this i
 FLEETING = 1e-11  # part of the largest slip in a motion below which one that is larger nowhere has no direction
 ROUNDED = 1e-14  # part of its terms to which a slip velocity is rounded off, many times over
 FAST = 1e-2  # part of the largest slip, below which one that grows in space turns too fast for an explicit method
+SLOWER = 0.5  # of that: an arc that ends at it leaves the next one above, however the end was rounded
 NONE = 1e-6  # part of its size below which what is looked at at an event counts as what fell to zero
 GRAZED = 1e-8  # part of the largest slip, or of a bound, to which a contact may come without an event
 EDGE = 1e-6  # part of an arc at its start at which nothing is grazed yet
@@ -134,7 +135,7 @@ class Slipping:
             band = self.band(i, int(np.searchsorted(self.run.t, here.t, "right")) - 1)
             limits = [(band, -1.0) if given_way(here, self._rows(i)) is None else (2.0 * band, 1.0)]
             grows = float(slip @ (slip_gradient(here, self.over, i)[:, : len(f)] @ f)) >= 0.0
-            if size < fast and (grows or size < 0.1 * band):
+            if size < SLOWER * fast and (grows or size < 0.1 * band):
                 stiff = True
                 limits.append((fast, 1.0))
             ends += [self._crossing(here, i, limit, way) for limit, way in limits]

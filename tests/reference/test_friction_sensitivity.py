@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from friction_scenes import G, point, rod_on_floor, rubbed_tree, tossed
+from friction_scenes import G, on_floor, pair, point, rod_on_floor, rubbed_tree, tossed
 
 from crossbody.cases import Mode, Outcome, SceneError, UnknownName
 from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, RowLaw, Shape
 from crossbody.reference import kernels, simulate
 from crossbody.reference.linear import _slipping, sensitivity
 from crossbody.reference.linear.differences import differences
@@ -153,6 +154,43 @@ def test_oblique_slide_in_space():
     scaled = found.by_start[:3, 3:5] @ [c, s]  # along the speed: places grow with its square
     np.testing.assert_allclose(scaled, 2.0 * where([c, s]), atol=1e-8)
     np.testing.assert_allclose(found.by_start[:2, 3:5], differences(lambda v: where(v)[:2], v[:2], 1e-4), atol=1e-8)
+
+
+def struck(seed):
+    """A ball that slides or rolls into one at rest on the same floor, drawn."""
+    rng, radius = np.random.default_rng(seed), 0.03
+    mu, between = rng.uniform(0.1, 0.4), rng.uniform(0.05, 0.2)
+    laws = [RowLaw(a0=10 ** rng.uniform(4, 6), a1=rng.uniform(5, 100)) for _ in range(2)]
+    sphere = Shape(name="first", body="first", type="sphere", size=(radius, 0, 0))
+    first = on_floor(Body(name="first", mass=0.2, inertia=(7.2e-5,) * 3 + (0, 0, 0)), sphere, mu)
+    second = [replace(part, name="second", body="second") for part in (first.joints[0], sphere)]
+    pairs = (
+        pair("floor", "first", mu, laws[0]),
+        pair("floor", "second", mu, laws[0]),
+        pair("first", "second", between, laws[1]),
+    )
+    scene = replace(
+        first, bodies=(*first.bodies, replace(first.bodies[-1], name="second")), joints=(*first.joints, second[0]),
+        shapes=(*first.shapes, second[1]), pairs=pairs,
+    )  # fmt: skip
+    q = [0, 0, radius, 1, 0, 0, 0, 2 * radius + 0.01, 0.5 * rng.uniform(-1, 1) * radius, radius, 1, 0, 0, 0]
+    return scene, q, [1.5, 0, 0, *rng.normal(scale=20, size=3), *np.zeros(6)]
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 10))])
+def test_a_ball_that_is_struck(seed):
+    """Its slip grows from nothing; where it turns slowly enough one arc ends at the very slip where the next begins."""
+    scene, q, v = struck(seed)
+    made = system(scene, case_of(scene).law)
+    assert compared(made, q, v, 0.012, ways=0, step=2e-5, runs=1e-13).outcome is Outcome.FINISHED
+
+
+def test_derivatives_that_take_too_long_say_how_far_they_came():
+    scene, q, v = struck(0)
+    found = sensitivity(system(scene, case_of(scene).law), q, v, 0.012, time_limit=0.2)
+    assert found.outcome is Outcome.TIME_LIMIT
+    assert "took 0.2 s up to t = " in found.message
+    assert np.isnan(found.by_start).all()
 
 
 @pytest.mark.parametrize("seed", [3, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 4, 5, 6, 7))])
