@@ -195,16 +195,14 @@ def _stuck(K: Any, s: Any, m: Model, w: Work, b: Buffers, code: int) -> int:
 
 
 @compiled
-def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """One step, cut short where a machine must switch."""
+def _try(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """One step or one arc in closed form, and what switches first in it; what ends the run, or has it taken anew."""
     length = exact.plan(s, w, m.unilateral)
     if length > 0.0:
-        before = s.method
         code = stepping.take_arc(K, s, m, w, b, length)
     else:
         if s.method == EXACT or s.method == SHORT:
             s.method = EXPLICIT
-        before = s.method
         code = stepping.attempt(K, s, m, w, b)
     if code in (STEP_TOO_SMALL, NOT_FINITE, ILL_POSED):
         return _stuck(K, s, m, w, b, code)
@@ -214,13 +212,20 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if code == TOO_LONG:
         s.rejected += 1
         s.h, s.watched = max(0.5 * s.theta, SHORTER) * s.hs, 0
-        return 0
+        return TOO_LONG
     s.steps += 1
     s.implicit_steps += s.method == IMPLICIT
     if code != 0:
         return _stuck(K, s, m, w, b, code) if code == NOT_FINITE else int(code)
-    if s.ng > 0 and not all_finite(w.guards[NODES - 1]):
-        return NOT_FINITE
+    return NOT_FINITE if s.ng > 0 and not all_finite(w.guards[NODES - 1]) else 0
+
+
+@compiled
+def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """One step, cut short where a machine must switch."""
+    code = _try(K, s, m, w, b)
+    if code != 0:
+        return 0 if code == TOO_LONG else int(code)
     fired = s.theta <= 1.0
     at_stop = s.t_old + s.hs >= s.stop - 4.0 * ULP * abs(s.stop)
     t = s.t_old + s.theta * s.hs if fired else (s.stop if at_stop else s.t_old + s.hs)
@@ -230,23 +235,28 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.standing = s.standing + 1 if fired and t - s.t_old <= STILL * ULP * abs(t) else 0
     if s.standing > STANDSTILL + s.nc + 1:
         return _stuck(K, s, m, w, b, STEP_TOO_SMALL)
-    if fired:
-        _land(K, s, m, w)
-        _remember_step(s, before)
-        _move(s, w, t)
-        return _switch(K, s, m, w, b)
+    if not fired:
+        return _arrive(K, s, m, w, b, t, at_stop)
+    _land(K, s, m, w)
+    _remember_step(s)
+    _move(s, w, t)
+    return _switch(K, s, m, w, b)
+
+
+@compiled
+def _arrive(K: Any, s: Any, m: Model, w: Work, b: Buffers, t: float, at_stop: bool) -> int:
+    """Go on from the end t of a whole step: nothing has fired in it."""
     if s.frictional and _sticks_too_hard(s, m, w, b):
         return INCONSISTENT
     _take_over(s, w)
     _move(s, w, t)
-    _remember_step(s, before)
+    _remember_step(s)
     if s.frictional and (ask(RENEW, s, m, w, NOTHING) > 0.0 or s.parting) and not at_stop:
         s.theta = 1.0
         return _switch(K, s, m, w, b)
-    if s.audited:
-        code = audit.account(K, s, m, w)
-        if code != 0:
-            return code
+    code = audit.account(K, s, m, w) if s.audited else 0
+    if code != 0:
+        return int(code)
     record.step_end(K, s, m, w, b.mode, b.out, b.modes)
     if s.method == EXPLICIT or s.method == IMPLICIT:
         choice.choose_method(s, w)
@@ -257,7 +267,7 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         code = _resume(K, s, m, w, b)
         if code == 0:
             record.here(K, s, m, w, b.mode, b.out, b.modes, False)
-    return code
+    return int(code)
 
 
 @compiled
@@ -268,9 +278,9 @@ def _share_anew(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 
 @compiled
-def _remember_step(s: Any, method: int) -> None:
+def _remember_step(s: Any) -> None:
     """The step to start with when the same kind of motion begins again."""
-    if method == EXPLICIT and s.method == EXPLICIT:
+    if s.method == EXPLICIT:
         if s.na > 0:
             s.h_active = s.h
         else:
