@@ -188,7 +188,6 @@ def judged(
         *truth_row(case, truth, command),
         *_idle(case, rows, command),
         *_blind(case, trusted, command),
-        *_unlike_stored(case, command),
     ]
 
 
@@ -274,8 +273,8 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
             )
 
 
-def _unlike_stored(case: Case, command: str) -> Iterator[Verdict]:
-    """Limits or claims by which no stored run was judged."""
+def unlike_stored(case: Case, command: str) -> Iterator[Verdict]:
+    """Yield a row of a case by name whose limits or claims are others than its stored runs were judged by."""
     if not judged_alike(case):
         why = "Limits or claims are not those of the stored runs; if the change is intended, run make bands."
         yield _of_truth(case, "limits", why, command, tier="")
@@ -283,9 +282,10 @@ def _unlike_stored(case: Case, command: str) -> Iterator[Verdict]:
 
 def _of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> Verdict:
     """Return a row that is outside of no run: no metric has its name, so that nobody looks for one."""
+    said: dict[str, Any] = {"value": math.nan, "verdict": Word.OUTSIDE, "tier": ""} | more
     return Verdict(
         case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=metric, unit="", command=command,
-        why=why, **({"value": math.nan, "verdict": Word.OUTSIDE, "tier": ""} | more),
+        why=why, **said,
     )  # fmt: skip
 
 

@@ -302,6 +302,41 @@ def counts(plain: Plain) -> Iterator[Control]:
         yield Control(fault="a contact without its modes", run=replace(run, mode=mode), sees=odd)
 
 
+WIDE = 3
+"""Samples on either side of one between which and its neighbours nothing may happen."""
+
+
+def modes(plain: Plain) -> Iterator[Control]:
+    """Call what presses free, and what slips a stick, at one sample amid others of the same modes."""
+    run = plain.run
+    still = np.isin(np.arange(len(run.t)), plain.quiet)
+    still[WIDE:-WIDE] &= np.all([still[i : len(still) - 2 * WIDE + i] for i in range(2 * WIDE + 1)], axis=0)
+    still[:WIDE] = still[len(still) - WIDE :] = False
+    for k in plain.normal if run.lam.any() else ():
+        presses = still & (run.lam[:, k] > FAR * float(np.max(np.abs(run.lam)))) & np.isin(run.mode[:, k], PUSHES)
+        for i in plain.samples(presses)[:1]:
+            freed = _with(run, "mode", (i, int(k)), Mode.FREE)
+            yield Control(fault=f"row {k} presses while FREE", run=freed, sees={"mode_contradicted": exactly(1.0)})
+            break
+    rows, ways, bound = _bounds(plain.case, run)
+    for k, row in enumerate(rows):
+        slides = still & (run.mode[:, row] == Mode.SLIP) & (bound[:, k] > FAR * float(np.max(np.abs(run.lam))))
+        at = [i for i in plain.samples(slides) if _slips(plain, i, ways[k])]
+        for i in at[:1]:
+            held = _with(run, "mode", (i, int(row)), Mode.STICK)
+            yield Control(fault=f"row {row} slips while STICK", run=held, sees={"mode_contradicted": exactly(1.0)})
+            return
+
+
+def _slips(plain: Plain, i: int, way: slice) -> bool:
+    """Whether a place slips at a sample with at least a part of the fastest coordinate's speed."""
+    system, run = equations(plain.case), plain.run
+    if system is None:
+        return False
+    slip = (system.gap(run.q[i], run.v[i])[1] - np.asarray(system.drift, dtype=np.float64))[way]
+    return float(np.linalg.norm(slip)) > TENTH * float(np.max(np.abs(run.v)))
+
+
 def _last_contact(plain: Plain) -> tuple[int, float, float] | None:
     """Return row, touch and end of a row's last contact, behind which it stays free; of bodies without friction."""
     for row in plain.some(plain.normal) if not (plain.case.rubs or plain.case.general) else ():
@@ -490,6 +525,6 @@ def _rubbed(plain: Plain, i: int, k: int) -> Iterator[Control]:
 
 
 KINDS: tuple[Callable[[Plain], Iterator[Control]], ...] = (
-    positions, velocities, starts, gaps, energies, forces, counts, touches, released, handed, switched, clocks,
+    positions, velocities, starts, gaps, energies, forces, modes, counts, touches, released, handed, switched, clocks,
     friction,
 )  # fmt: skip
