@@ -249,28 +249,35 @@ def energies(plain: Plain) -> Iterator[Control]:
         yield Control(fault=f"kinetic energy {size:g} too large", run=more, sees={"energy_residual": roughly(PART)})
 
 
+FORCED = {2.0: "doubled", 0.0: "left out"}
+"""Factors on all forces."""
+
+
 def forces(plain: Plain) -> Iterator[Control]:
-    """Double all multipliers and impulses; put one off at one sample, to where it pulls, or pushes at nothing."""
+    """Double all multipliers and impulses, or leave them out; put one off, to where it pulls, or pushes at nothing."""
     run, rows = plain.run, plain.normal
     largest = float(np.max(np.abs(run.lam), initial=0.0))
     if not largest > RESTS and not any(event.impulse for event in run.events):
         return
-    events = tuple(replace(event, impulse=2.0 * event.impulse) for event in run.events)
-    yield Control(
-        fault="multipliers and impulses doubled", run=replace(run, lam=2.0 * run.lam, events=events),
-        sees=dict.fromkeys(("lam_impulse_path", "lam_impulse"), roughly(1.0)),
-    )  # fmt: skip
+    for times, said in FORCED.items():
+        events = tuple(replace(event, impulse=times * event.impulse) for event in run.events)
+        yield Control(
+            fault=f"multipliers and impulses {said}", run=replace(run, lam=times * run.lam, events=events),
+            sees=dict.fromkeys(("lam_impulse_path", "lam_impulse"), roughly(1.0)),
+        )  # fmt: skip
     if not largest > RESTS:
         return
     few = taken(run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
-    twice = replace(few, lam=2.0 * few.lam)
-    yield Control(fault="multipliers doubled", run=twice, sees={"law_residual": roughly(1.0)}, plain=few)
     at = tuple(np.unravel_index(np.argmax(np.abs(few.lam)), few.lam.shape))
-    one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + MUCH) * few.lam[at])
-    seen = (TENTH * MUCH, ROUGH * MUCH)
-    yield Control(
-        fault="the largest multiplier too large at one sample", run=one, sees={"law_residual": seen}, plain=few
-    )
+    for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
+        other = replace(few, lam=times * few.lam)
+        yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": roughly(1.0)}, plain=few)
+        one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + sign * MUCH) * few.lam[at])
+        seen = (TENTH * MUCH, ROUGH * MUCH)
+        yield Control(
+            fault=f"the largest multiplier {sign * MUCH:g} off at one sample", run=one, sees={"law_residual": seen},
+            plain=few,
+        )  # fmt: skip
     k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
     for i, sign in plain.both():
         one = plain.off("lam", (i, k), sign * MUCH * largest)

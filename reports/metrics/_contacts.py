@@ -23,7 +23,7 @@ UNITS = {
     "constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m",
     "slip_times": "s", "stick_times": "s",
 }  # fmt: skip
-NEEDS: dict[str, str] = {}
+NEEDS = {"mode_contradicted": "lam"}
 KNOWN = 1e-6
 """Part of the largest to which limits hold gaps and what releases leave of multipliers."""
 SHALLOW = 1e-12
@@ -118,10 +118,12 @@ def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None
     between samples, or a closed one is above by as much and bears nothing; at which friction is called SLIP below half
     its bound, STICK beyond one and a half times it (pyramids in and around a cone of friction are within the root of
     two), or STICK at its bound while it slips. Samples beside events are left out: a step has the force of either side.
-    It asks nothing of the truth or the law. None without rows, modes or forces.
+    It asks nothing of the truth or the law. None without rows and where modes are not known, NaN where lam is not.
     """
-    if not run.mode.size or (run.mode < 0).any() or np.isnan(run.lam).any() or len(run.t) < 2:
+    if not run.mode.size or (run.mode < 0).any() or len(run.t) < 2:
         return None
+    if np.isnan(run.lam).any():
+        return math.nan
     quiet, light = _between_events(run), KNOWN * float(np.max(np.abs(run.lam)))
     rows = case.law.unilateral
     mode, gap, bears = run.mode[:, rows], run.gap[:, rows], np.abs(run.lam[:, rows]) > light
