@@ -77,6 +77,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
         return
     yield "gap_residual", 1e-9, _IDENTITY
     yield "mode_residual", 0.0, "an identity at every sample"
+    yield "mode_contradicted", 0.0, "a mode says what the recorded gap, force and slip are"
     yield "law_residual", 1e-6, "the law's own equation at every state, with the rounding of stiff rows"
     yield "lam_impulse_path", 1e-5, _FASTER
     yield "contact_work", 1e-6, _TOLERANCE

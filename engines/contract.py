@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -71,6 +71,7 @@ class Engine(ABC):
         steps: profile whose known deviations hide what it applies -> theta: a step of its setting `dt` moves by
             dt (v + theta (v+ - v)); NaN without such steps. Those that it takes first, accelerations, friction
             and the setting `restitution` are held against the law's (`crossbody.reports.judging.first_steps`).
+        late: profiles of these whose contacts push by the force of the step before: none of a first blow is held.
         of_scenes: profile -> the one that stands for it in a scene, a robot's file say, where all
             profiles are meant.
         interpreted: profile ("*" for all) -> what of its timed runs is Python, which the
@@ -83,6 +84,7 @@ class Engine(ABC):
     hidden: Mapping[str, Mapping[str, str]] = NOTHING
     orders: Mapping[str, float] = NOTHING
     steps: Mapping[str, float] = NOTHING
+    late: Set[str] = frozenset()
     of_scenes: Mapping[str, str] = NOTHING
     interpreted: Mapping[str, str] = NOTHING
 

@@ -153,7 +153,8 @@ class Drake(Engine):
     hidden = HIDDEN
     versions: Mapping[str, str] = {"drake": version("drake")}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
-    steps: Mapping[str, float] = {"matched": 1.0}  # of contacts with friction; by default it lags a step behind
+    steps: Mapping[str, float] = {"matched": 1.0, "default": 1.0}
+    late = frozenset({"default"})
 
     def why_not(self, case: Case, profile: str) -> str | None:
         """Cases of their own kernels that are not on a line; contacts of a plant that never open."""

@@ -10,7 +10,17 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from crossbody import cases, engines
-from crossbody.cases import Case, CaseUnsupported, Claim, CrossbodyError, InvalidValue, Limit, Trajectory, UnknownName
+from crossbody.cases import (
+    Case,
+    CaseUnsupported,
+    Claim,
+    CrossbodyError,
+    InvalidValue,
+    Limit,
+    Outcome,
+    Trajectory,
+    UnknownName,
+)
 from crossbody.cases.arguments import instance, shown
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
@@ -26,6 +36,7 @@ from crossbody.reports.judging.stored import (
     defaults,
     deviations,
     differing,
+    judged_alike,
     lacking,
     words,
 )
@@ -40,6 +51,7 @@ from crossbody.reports.judging.verdict import (
     as_stored,
     band,
     deviation,
+    exit_code,
     explained,
     judge,
     limit_for,
@@ -171,7 +183,12 @@ def judged(
     truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
     trusted = shortened(truth)
     rows = [row for entry in entries for row in verdicts(case, entry, trusted, command, begin)]
-    return [*rows, *truth_row(case, truth, command), *_idle(case, rows, command), *_blind(case, trusted, command)]
+    return [
+        *rows,
+        *truth_row(case, truth, command),
+        *_idle(case, rows, command),
+        *_blind(case, trusted, command),
+    ]
 
 
 PART_ROWS = tuple(part_of(metric, part) for metric in SPLIT for part in PARTS)
@@ -256,11 +273,19 @@ def _idle(case: Case, rows: Sequence[Verdict], command: str) -> Iterator[Verdict
             )
 
 
+def unlike_stored(case: Case, command: str) -> Iterator[Verdict]:
+    """Yield a row of a case by name whose limits or claims are others than its stored runs were judged by."""
+    if not judged_alike(case):
+        why = "Limits or claims are not those of the stored runs; if the change is intended, run make bands."
+        yield _of_truth(case, "limits", why, command, tier="")
+
+
 def _of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> Verdict:
     """Return a row that is outside of no run: no metric has its name, so that nobody looks for one."""
+    said: dict[str, Any] = {"value": math.nan, "verdict": Word.OUTSIDE, "tier": ""} | more
     return Verdict(
-        case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=metric, unit="", verdict=Word.OUTSIDE,
-        command=command, why=why, **({"value": math.nan} | more),
+        case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=metric, unit="", command=command,
+        why=why, **said,
     )  # fmt: skip
 
 
@@ -288,6 +313,83 @@ def _blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
         else:
             why = f"A control is not seen as it is: {fault} must come out between {least:.3g} and {most:.3g}."
         yield _of_truth(case, f"{name} (control)", why, command, tier=truth.tier.value, value=value)
+    for name, fault in _unsaid(near):
+        word = next((one for one in WRONG if exit_code([one])), Word.OUTSIDE)
+        yield _of_truth(case, f"{name} (control)", f"A control passes: {fault}.", command, verdict=word)
+
+
+WRONG = (Word.OUTSIDE, Word.CRASHED)
+BESIDE = 1e-3
+"""Part of a limit by which a number is beside it."""
+HALF = 0.5
+
+
+def _unsaid(judge_: _Judge) -> Iterator[tuple[str, str]]:
+    """Yield what a judge does not say of runs and numbers of which it is known what must be said."""
+    yield from _unsaid_of_limits(judge_)
+    truth, run, entry = judge_.truth, judge_.truth.trajectory, judge_.entry
+    for word in Word:
+        if exit_code([Word.WITHIN, word]) != int(word in WRONG):
+            yield "exit code", f"it does not tell {word} as it must"
+    if exit_code([Word.WITHIN], [Regression.KEPT]) or not exit_code([Word.WITHIN], [Regression.KEPT, Regression.LOST]):
+        yield "exit code", "it does not tell what was lost"
+    for wanted, told in ((Word.CRASHED, {"crashed": "a fault"}), (Word.SKIPPED, {"skipped": "a reason"})):
+        rows = verdicts(judge_.case, replace(entry, **told), truth, "")  # type: ignore[arg-type]
+        if [row.verdict for row in rows] != [wanted]:
+            yield "run", f"one that is {wanted} is not"
+    short = before(run, HALF * float(run.t[-1]))
+    if _outcome(judge_, replace(short, outcome=Outcome.FINISHED)).verdict != Word.OUTSIDE:
+        yield "finished", "a run that ends halfway is not outside"
+    if _outcome(judge_, replace(run, outcome=Outcome.TIME_LIMIT)).verdict != Word.OUTSIDE:
+        yield "finished", "a run that says that it did not finish is not outside"
+    off = AuditRow(quantity="masses", mine="", theirs="", difference=BESIDE, tolerance=0.0)
+    same = replace(off, difference=0.0)
+    found = [_audit(_of(judge_, audit=rows)).verdict for rows in ((same, off), (off, same), (same, same))]
+    if found != [Word.OUTSIDE, Word.OUTSIDE, Word.WITHIN]:
+        yield "audit", "other masses are not outside, or the same are"
+    known = replace(truth, at=lambda times: before(run, float(times[-1])) if len(times) else run)
+    compared = [_value(_Last(), "position", known, one, judge_.case)[1] * judge_.case.t_end for one in (short, run)]
+    if any(
+        abs(a - min(float(b.t[-1]), truth.trusted)) > REACHED * judge_.case.t_end
+        for a, b in zip(compared, (short, run), strict=True)
+    ):
+        yield "compared", "it is not the part of the horizon for which the truth was asked"
+
+
+class _Last:
+    """A metric that asks for the truth at the end of a run."""
+
+    UNIT, CLAIMED = "1", False
+
+    def measure(self, truth: Truth, run: Trajectory, case: Case) -> float | None:
+        """Return nothing of it."""
+        truth.at(run.t)
+        return 0.0
+
+
+def _of(judge_: _Judge, **more: Any) -> _Judge:
+    """Return a judge of another entry."""
+    return _Judge(judge_.case, replace(judge_.entry, **more), judge_.truth, "")
+
+
+def _unsaid_of_limits(judge_: _Judge) -> Iterator[tuple[str, str]]:
+    """Yield limits of which numbers on either side, or none, are not said to be so."""
+    for name in dict.fromkeys([*judge_.claims, *(limit.metric for limit in judge_.limits)]):
+        claim, limit = judge_.claims.get(name), judge_.limit(name)
+        if name in ("*", "audit") or (limit is None and claim is None) or (limit is not None and limit.known):
+            continue
+        expected, most = 0.0 if claim is None else claim.expected, 0.0 if limit is None else limit.value
+        beside = BESIDE * (most or abs(expected) or 1.0)
+        wanted = [(expected + sign * (most + beside), Word.OUTSIDE) for sign in (1.0, -1.0)]
+        wanted += [(expected + sign * (most - beside), Word.WITHIN) for sign in (1.0, -1.0) if most > 0.0]
+        wanted += [(sign * math.inf, Word.OUTSIDE) for sign in (1.0, -1.0)] + [(math.nan, Word.OUTSIDE)]
+        wanted += [(-expected, Word.OUTSIDE)] if abs(expected) > most else []
+        for value, word in wanted:
+            if (found := judge_.judged(name, value, "", judge_.truth, 1.0).verdict) != word:
+                yield name, f"{value:g} is {found}, but must be {word}"
+                break
+        if judge_.missing(name, "", "", "").verdict != Word.OUTSIDE:
+            yield name, "a number that lacks is not outside"
 
 
 def _unruled(case: Case) -> Iterator[Blind]:

@@ -97,24 +97,28 @@ def unheard(case: Case) -> Iterator[Blind]:
     except CaseUnsupported:
         return
     asked = [key for key in QUANTITIES if key in theirs and _something(key, theirs[key], case)]
-    off = {row.quantity: row for row in audit({key: _times(theirs[key]) for key in asked}, theirs, case)}
+    large, small = (
+        {row.quantity: row for row in audit({key: _times(theirs[key], by) for key in asked}, theirs, case)}
+        for by in (1.0 + MORE, 1.0 - MORE)
+    )
     missing = {row.quantity: row for row in audit({}, theirs, case)}
     for key in asked:
         for found, (least, most), fault in (
-            (off, (0.5 * MORE, 2.0 * MORE), f"{key} {MORE:g} too large"),
+            (large, (0.5 * MORE, 2.0 * MORE), f"{key} {MORE:g} too large"),
+            (small, (0.5 * MORE, 2.0 * MORE), f"{key} {MORE:g} too small"),
             (missing, (np.inf, np.inf), f"{key} not shown"),
         ):
             if key not in found or found[key].ok or not least <= found[key].difference <= most:
                 yield "audit", found[key].difference if key in found else np.nan, (least, most), fault
 
 
-def _times(value: Any) -> Any:
-    """Return a value or a function a part too large."""
+def _times(value: Any, by: float) -> Any:
+    """Return a value or a function times a factor."""
     if isinstance(value, Mapping):
-        return {name: _times(one) for name, one in value.items()}
+        return {name: _times(one, by) for name, one in value.items()}
     if callable(value):
-        return lambda *at: _times(value(*at))
-    return (1.0 + MORE) * np.asarray(value, dtype=np.float64)
+        return lambda *at: _times(value(*at), by)
+    return by * np.asarray(value, dtype=np.float64)
 
 
 def _something(key: str, value: Any, case: Case) -> bool:

@@ -42,8 +42,9 @@ BEFORE = 2.75
 """How many steps before a pair meets."""
 TOLERANCE, OF_PLACES = 2e-3, 0.02
 """To which a force or a restitution is what it must be, and theta."""
-CHANGES, HALF = 2e-7, 0.5
-"""Part of a velocity that is a change; and how many steps from its touch a pair meets at most."""
+CHANGES, GROWS, HALF = 2e-7, 1e-3, 0.5
+"""Part of a velocity that is a change, and of the next change that is no rounding; and how many steps
+from its touch a pair meets at most."""
 NEWTON, ROUNDED, NONE = 20, 1e-13, 1e-8
 """Iterations that place bodies, m; and part of a momentum that is none."""
 SEED, USUAL, LEAST = 20240917, 1e-3, 1e-5
@@ -163,7 +164,7 @@ def first_steps(
     same = all(row.ok for row in audited if row.quantity in ("M", "bias"))
     probe = Probe(case, *who, used, asked, theirs, system, same and "dt" in used and not math.isnan(theta))
     try:
-        return (*(_free(probe) if probe.steps else ()), *_blows(probe))
+        return (*(_free(probe) if probe.steps else ()), *(() if who[1] in who[0].late else _blows(probe)))
     except (CrossbodyError, np.linalg.LinAlgError):  # a state that the engine or the reference refuses
         return ()
 
@@ -258,9 +259,13 @@ def _touched(probe: Probe, rates: Floats) -> Iterator[AuditRow]:
 
     Where velocities do not count in how far a step moves, they follow from where it ends.
     """
-    behind = np.flatnonzero(np.max(np.abs(rates), axis=1) > CHANGES * probe.meets)
-    if len(behind):  # a spring pushes later
-        found = BEFORE - float(behind[0]) + float(probe.engine.steps[probe.profile] > 0.0)
+    size = np.max(np.abs(rates), axis=1)
+    behind = np.flatnonzero(size > CHANGES * probe.meets)
+    if len(behind):
+        first = int(behind[0])
+        while first > 0 and size[first - 1] > GROWS * size[first]:  # a spring begins to push by less
+            first -= 1
+        found = BEFORE - float(first) + float(probe.engine.steps[probe.profile] > 0.0)
         yield _row("touches", found, 0.0, abs(found), HALF)
 
 

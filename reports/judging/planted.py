@@ -24,8 +24,8 @@ SLACK, ROUGH = 1e-3, 3.0
 """Part, and factor, by which a number may differ from what follows: by rounding, and by where samples stand."""
 QUIET = 1e-5
 """Part of the horizon within which samples are at an event, and say nothing but of it."""
-SEED, DRAWN = 20261127, 2
-"""Of all draws, and how many coordinates, rows and samples are drawn for one kind of fault."""
+SEED, DRAWN, QUARTERS = 20261127, 2, 4
+"""Of all draws, how many coordinates and rows are drawn for one kind of fault, and into what samples are parted."""
 LOOKED, FEW = 400, 40
 """Samples that identities look at, at most: a fault covers their neighbours; and samples for what takes long."""
 RESTS, TINY = 1e-4, 1e-6
@@ -100,9 +100,15 @@ class Plain:
         self.turning = frozenset(i + k for i in self.case.quaternions for k in range(4))
 
     def samples(self, among: NDArray[np.bool_] | None = None) -> list[int]:
-        """Draw quiet samples of those that are asked for, in any order."""
+        """Draw quiet samples of those that are asked for: one early and one late, in any order."""
         kept = self.quiet if among is None else self.quiet[among[self.quiet]]
-        return [int(i) for i in self.draw.choice(kept, min(DRAWN, len(kept)), replace=False)]
+        few = -(-len(kept) // QUARTERS)
+        ends = [kept[:few], kept[-few:]] if len(kept) > few else [kept]
+        return [int(self.draw.choice(ends[k])) for k in self.draw.permutation(len(ends)) if few]
+
+    def both(self) -> Iterator[tuple[int, float]]:
+        """Yield an early and a late sample, and a sign for each: what is too small is as wrong as what is too large."""
+        yield from zip(sorted(self.samples()), self.draw.permutation([1.0, -1.0]).tolist(), strict=False)
 
     def some(self, of: Sequence[int] | NDArray[np.intp]) -> list[int]:
         """Draw a few of some numbers."""
@@ -138,10 +144,11 @@ def positions(plain: Plain) -> Iterator[Control]:
     for j in plain.some([j for j in range(run.q.shape[1]) if j not in plain.turning]):
         size, own = PART * float(largest[j]), float(np.max(np.abs(run.q[:, j])))
         most = max(size / own, size) if own > TENTH * largest[j] else np.inf
-        for i in plain.samples():
+        for i, sign in plain.both():
             yield Control(
-                fault=f"{case.coordinates[j].name} off by {size:.3g} {case.coordinates[j].unit} at one sample",
-                run=plain.off("q", (i, j), size), sees={"position": ((1.0 - SLACK) * PART, (1.0 + SLACK) * most)},
+                fault=f"{case.coordinates[j].name} off by {sign * size:.3g} {case.coordinates[j].unit} at one sample",
+                run=plain.off("q", (i, j), sign * size),
+                sees={"position": ((1.0 - SLACK) * PART, (1.0 + SLACK) * most)},
             )  # fmt: skip
     for j in case.quaternions[:DRAWN]:
         for i in plain.samples()[:1]:
@@ -168,14 +175,14 @@ def velocities(plain: Plain) -> Iterator[Control]:
     case, run = plain.case, plain.run
     largest = _of_unit(run.v, case.velocities, [c.rate for c in case.velocities])
     for j in plain.some(range(run.v.shape[1])):
-        for i in plain.samples():
+        for i, sign in plain.both():
             yield Control(
-                fault=f"the velocity of {case.velocities[j].name} {PART:g} of the largest off at one sample",
-                run=plain.off("v", (i, j), PART * float(largest[j])), sees={"velocity": exactly(PART)},
+                fault=f"the velocity of {case.velocities[j].name} {sign * PART:g} of the largest off at one sample",
+                run=plain.off("v", (i, j), sign * PART * float(largest[j])), sees={"velocity": exactly(PART)},
             )  # fmt: skip
-    if np.ptp(run.q, axis=0).max() > RESTS:
-        fast = replace(run, v=(1.0 + TENTH) * run.v)
-        yield Control(fault=f"velocities {TENTH:g} too large", run=fast, sees={"rate_residual": roughly(TENTH)})
+    for size in (TENTH, -TENTH) if np.ptp(run.q, axis=0).max() > RESTS else ():
+        fast = replace(run, v=(1.0 + size) * run.v)
+        yield Control(fault=f"velocities {size:g} too large", run=fast, sees={"rate_residual": roughly(TENTH)})
 
 
 def starts(plain: Plain) -> Iterator[Control]:
@@ -183,10 +190,10 @@ def starts(plain: Plain) -> Iterator[Control]:
     case, run = plain.case, plain.run
     largest = _of_unit(run.q, case.coordinates, [c.size for c in case.coordinates])
     for j in plain.some([j for j in range(run.q.shape[1]) if j not in plain.turning])[: int(run.t[0] == 0.0)]:
-        begun = plain.off("q", (0, j), PART * float(largest[j]))
-        yield Control(
-            fault=f"a start {PART:g} of the largest coordinate off", run=begun, sees={"start_error": exactly(PART)}
-        )
+        for size in (PART, -PART):
+            begun = plain.off("q", (0, j), size * float(largest[j]))
+            said = f"a start {size:g} of the largest coordinate off"
+            yield Control(fault=said, run=begun, sees={"start_error": exactly(PART)})
 
 
 def gaps(plain: Plain) -> Iterator[Control]:
@@ -194,17 +201,18 @@ def gaps(plain: Plain) -> Iterator[Control]:
     run, rows = plain.run, plain.normal
     closed = np.flatnonzero(~plain.case.law.unilateral & (plain.case.law.a0 > 0.0))
     for k in plain.some(rows):
-        size = PART * max(float(np.max(np.abs(run.gap[:, rows]))), RESTS)
-        i, wide = plain.samples()[0], -(-len(run.t) // LOOKED)
-        said, least = f"the gap of row {k} {size:.3g} off at one sample", (1.0 - SLACK) * PART
-        own = float(np.max(np.abs(run.gap[:, k])))  # its bodies may be farther away than it ever opens
-        most = (1.0 + SLACK) * size / own if own > 0.0 else np.inf
-        yield Control(fault=said, run=plain.off("gap", (i, k), size), sees={"gap_error": (least, most)})
-        size = PART * max(float(np.max(np.abs(run.gap))), RESTS)
-        yield Control(
-            fault=f"the gap of row {k} {size:.3g} off for some samples", sees={"gap_residual": roughly(PART)},
-            run=plain.off("gap", (slice(i, i + wide), k), size),
-        )  # fmt: skip
+        some, every = (PART * max(float(np.max(np.abs(gap))), RESTS) for gap in (run.gap[:, rows], run.gap))
+        own, wide = float(np.max(np.abs(run.gap[:, k]))), -(-len(run.t) // LOOKED)
+        most = (1.0 + SLACK) * some / own if own > 0.0 else np.inf  # its bodies may be farther than it ever opens
+        for i, sign in plain.both():
+            yield Control(
+                fault=f"the gap of row {k} {sign * some:.3g} off at one sample",
+                run=plain.off("gap", (i, k), sign * some), sees={"gap_error": ((1.0 - SLACK) * PART, most)},
+            )  # fmt: skip
+            yield Control(
+                fault=f"the gap of row {k} {sign * every:.3g} off for some samples",
+                run=plain.off("gap", (slice(i, i + wide), k), sign * every), sees={"gap_residual": roughly(PART)},
+            )  # fmt: skip
     for k in plain.some(rows)[:1]:
         deep = PART * max(float(np.max(np.abs(run.gap))), RESTS) + float(np.max(-run.gap[:, rows], initial=0.0))
         below = _with(run, "gap", (plain.samples()[0], k), -deep)
@@ -223,48 +231,57 @@ def energies(plain: Plain) -> Iterator[Control]:
     if np.ptp(run.q, axis=0).max() <= RESTS or swing <= TINY * float(np.max(np.abs(run.energy))):
         return
     account = {} if run.ledger is None else {"energy_integrator": exactly(PART)}
-    i = plain.samples()[0]
-    yield Control(
-        fault=f"kinetic energy {PART:g} of the largest too large at one sample",
-        run=plain.off("energy", (i, 0), PART * swing), sees={"energy_drift": exactly(PART), **account},
-    )  # fmt: skip
-    if kinetic > 0.0:
-        more = plain.off("energy", (slice(None), 0), PART * run.energy[:, 0])
-        yield Control(fault=f"kinetic energy {PART:g} too large", run=more, sees={"energy_residual": roughly(PART)})
-    if run.ledger is not None and run.gap.shape[1]:
-        work = np.array(run.ledger.contact)
-        work[i, int(plain.draw.integers(work.shape[1]))] += PART * swing
+    for i, sign in plain.both():
         yield Control(
-            fault=f"work of a row {PART:g} of the largest energy off at one sample",
-            run=replace(run, ledger=replace(run.ledger, contact=work)), sees={"contact_work": exactly(PART), **account},
+            fault=f"kinetic energy {sign * PART:g} of the largest off at one sample",
+            run=plain.off("energy", (i, 0), sign * PART * swing), sees={"energy_drift": exactly(PART), **account},
         )  # fmt: skip
+        if run.ledger is not None and run.gap.shape[1]:
+            work = np.array(run.ledger.contact)
+            work[i, int(plain.draw.integers(work.shape[1]))] += sign * PART * swing
+            yield Control(
+                fault=f"work of a row {sign * PART:g} of the largest energy off at one sample",
+                run=replace(run, ledger=replace(run.ledger, contact=work)),
+                sees={"contact_work": exactly(PART), **account},
+            )  # fmt: skip
+    for size in (PART, -PART) if kinetic > 0.0 else ():
+        more = plain.off("energy", (slice(None), 0), size * run.energy[:, 0])
+        yield Control(fault=f"kinetic energy {size:g} too large", run=more, sees={"energy_residual": roughly(PART)})
+
+
+FORCED = {2.0: "doubled", 0.0: "left out"}
+"""Factors on all forces."""
 
 
 def forces(plain: Plain) -> Iterator[Control]:
-    """Double all multipliers and impulses; put one off at one sample, to where it pulls, or pushes at nothing."""
+    """Double all multipliers and impulses, or leave them out; put one off, to where it pulls, or pushes at nothing."""
     run, rows = plain.run, plain.normal
     largest = float(np.max(np.abs(run.lam), initial=0.0))
     if not largest > RESTS and not any(event.impulse for event in run.events):
         return
-    events = tuple(replace(event, impulse=2.0 * event.impulse) for event in run.events)
-    yield Control(
-        fault="multipliers and impulses doubled", run=replace(run, lam=2.0 * run.lam, events=events),
-        sees=dict.fromkeys(("lam_impulse_path", "lam_impulse"), roughly(1.0)),
-    )  # fmt: skip
+    for times, said in FORCED.items():
+        events = tuple(replace(event, impulse=times * event.impulse) for event in run.events)
+        yield Control(
+            fault=f"multipliers and impulses {said}", run=replace(run, lam=times * run.lam, events=events),
+            sees=dict.fromkeys(("lam_impulse_path", "lam_impulse"), roughly(1.0)),
+        )  # fmt: skip
     if not largest > RESTS:
         return
     few = taken(run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
-    twice = replace(few, lam=2.0 * few.lam)
-    yield Control(fault="multipliers doubled", run=twice, sees={"law_residual": roughly(1.0)}, plain=few)
     at = tuple(np.unravel_index(np.argmax(np.abs(few.lam)), few.lam.shape))
-    one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + MUCH) * few.lam[at])
-    seen = (TENTH * MUCH, ROUGH * MUCH)
-    yield Control(
-        fault="the largest multiplier too large at one sample", run=one, sees={"law_residual": seen}, plain=few
-    )
-    i, k = plain.samples()[0], int(np.argmax(np.max(np.abs(run.lam), axis=0)))
-    one = plain.off("lam", (i, k), MUCH * largest)
-    yield Control(fault="a multiplier off at one sample", run=one, sees={"lam_error": exactly(MUCH)})
+    for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
+        other = replace(few, lam=times * few.lam)
+        yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": roughly(1.0)}, plain=few)
+        one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + sign * MUCH) * few.lam[at])
+        seen = (TENTH * MUCH, ROUGH * MUCH)
+        yield Control(
+            fault=f"the largest multiplier {sign * MUCH:g} off at one sample", run=one, sees={"law_residual": seen},
+            plain=few,
+        )  # fmt: skip
+    k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
+    for i, sign in plain.both():
+        one = plain.off("lam", (i, k), sign * MUCH * largest)
+        yield Control(fault="a multiplier off at one sample", run=one, sees={"lam_error": exactly(MUCH)})
     most = PART * float(np.max(np.abs(run.lam[:, rows]), initial=0.0))
     wrong = {"pulls": (-most, np.isin(run.mode, PUSHES)), "pushes at nothing": (most, run.mode == Mode.FREE)}
     for k in plain.some(rows) if most > 0.0 else ():
@@ -290,6 +307,41 @@ def counts(plain: Plain) -> Iterator[Control]:
     if known:
         odd = {"mode_residual": (float(known), float(np.sum(mode != run.mode) * mode.shape[1]))}
         yield Control(fault="a contact without its modes", run=replace(run, mode=mode), sees=odd)
+
+
+WIDE = 3
+"""Samples on either side of one between which and its neighbours nothing may happen."""
+
+
+def modes(plain: Plain) -> Iterator[Control]:
+    """Call what presses free, and what slips a stick, at one sample amid others of the same modes."""
+    run = plain.run
+    still = np.isin(np.arange(len(run.t)), plain.quiet)
+    still[WIDE:-WIDE] &= np.all([still[i : len(still) - 2 * WIDE + i] for i in range(2 * WIDE + 1)], axis=0)
+    still[:WIDE] = still[len(still) - WIDE :] = False
+    for k in plain.normal if run.lam.any() else ():
+        presses = still & (run.lam[:, k] > FAR * float(np.max(np.abs(run.lam)))) & np.isin(run.mode[:, k], PUSHES)
+        for i in plain.samples(presses)[:1]:
+            freed = _with(run, "mode", (i, int(k)), Mode.FREE)
+            yield Control(fault=f"row {k} presses while FREE", run=freed, sees={"mode_contradicted": exactly(1.0)})
+            break
+    rows, ways, bound = _bounds(plain.case, run)
+    for k, row in enumerate(rows):
+        slides = still & (run.mode[:, row] == Mode.SLIP) & (bound[:, k] > FAR * float(np.max(np.abs(run.lam))))
+        at = [i for i in plain.samples(slides) if _slips(plain, i, ways[k])]
+        for i in at[:1]:
+            held = _with(run, "mode", (i, int(row)), Mode.STICK)
+            yield Control(fault=f"row {row} slips while STICK", run=held, sees={"mode_contradicted": exactly(1.0)})
+            return
+
+
+def _slips(plain: Plain, i: int, way: slice) -> bool:
+    """Whether a place slips at a sample with at least a part of the fastest coordinate's speed."""
+    system, run = equations(plain.case), plain.run
+    if system is None:
+        return False
+    slip = (system.gap(run.q[i], run.v[i])[1] - np.asarray(system.drift, dtype=np.float64))[way]
+    return float(np.linalg.norm(slip)) > TENTH * float(np.max(np.abs(run.v)))
 
 
 def _last_contact(plain: Plain) -> tuple[int, float, float] | None:
@@ -335,6 +387,21 @@ def _left(run: Trajectory, event: Event, early: float) -> Range:
 def shifted(run: Trajectory, which: Sequence[Event], by: float) -> Trajectory:
     """Return a motion with the instants of some events off, s."""
     return replace(run, events=tuple(replace(e, t=e.t + by) if e in which else e for e in run.events))
+
+
+def released(plain: Plain) -> Iterator[Control]:
+    """Record the end of a contact too late, and too early: by a part of the time since anything happened."""
+    run = plain.run
+    ends = [e for e in run.events if e.before in PUSHES and e.after not in PUSHES and e.contact in plain.normal]
+    for event in ends if not (plain.case.rubs or plain.case.general) else ():
+        behind = min([e.t for e in run.events if e.t > event.t], default=float(run.t[-1]))
+        off, lam = 0.05 * min(behind - event.t, _since_last(run, event)), np.abs(run.lam[:, event.contact])
+        alone = off > 0.0 and sum(e.t == event.t for e in run.events) == 1
+        if alone and float(np.interp(event.t - off, run.t, lam)) > FAR * float(lam.max()):
+            for by in (off, -off):
+                moved = shifted(run, [event], by)
+                yield Control(fault=f"a release {by:.3g} s off", run=moved, sees={"event_times": exactly(off)})
+            return
 
 
 def handed(plain: Plain) -> Iterator[Control]:
@@ -465,5 +532,6 @@ def _rubbed(plain: Plain, i: int, k: int) -> Iterator[Control]:
 
 
 KINDS: tuple[Callable[[Plain], Iterator[Control]], ...] = (
-    positions, velocities, starts, gaps, energies, forces, counts, touches, handed, switched, clocks, friction,
+    positions, velocities, starts, gaps, energies, forces, modes, counts, touches, released, handed, switched, clocks,
+    friction,
 )  # fmt: skip

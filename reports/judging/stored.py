@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody.cases import Case
+from crossbody.cases.defaults import limits_of
 
 if TYPE_CHECKING:
     from crossbody.reports.judging.comparison import Entry
@@ -59,6 +60,11 @@ def compared_until(case: Case) -> float:
     return float(stored.get("compared", case.t_end)) if stored.get("parameters") == _digest(case) else math.nan
 
 
+def judged_alike(case: Case) -> bool:
+    """Whether limits and claims of a case are those of its stored runs; true where none are stored."""
+    return math.isnan(compared_until(case)) or _table()[case.label].get("limits") == _limits(case)
+
+
 def changed(case: Case) -> bool:
     """Whether runs of a case are stored, with other parameters: its limits are for those."""
     return case.label in _table() and math.isnan(compared_until(case))
@@ -90,6 +96,17 @@ def _digest(case: Case) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
+def _limits(case: Case) -> str:
+    """Return a digest of all that decides what is outside, to six digits."""
+    limits = [
+        f"{x.metric} {x.engine} {x.profile} {x.value:.6g} {x.known_least:.6g} {x.known_size:.6g} {x.covers_none} "
+        f"{x.known != ''}"
+        for x in limits_of(case)
+    ]
+    claims = [f"{claim.metric} {claim.expected:.6g}" for claim in case.claims]
+    return hashlib.sha256("\n".join([*limits, "", *claims]).encode()).hexdigest()[:12]
+
+
 def laid(case: Case, entry: Entry, found: Deviations, trusted: float) -> Laid:
     """Return what is stored of a run, as plain numbers that a process can send to another.
 
@@ -99,7 +116,8 @@ def laid(case: Case, entry: Entry, found: Deviations, trusted: float) -> Laid:
         found: metric -> deviation.
         trusted: up to when it was compared, s.
     """
-    head = {"parameters": _digest(case)} | ({"compared": float(f"{trusted:.3g}")} if trusted < case.t_end else {})
+    head: dict[str, Any] = {"parameters": _digest(case), "limits": _limits(case)}
+    head |= {"compared": float(f"{trusted:.3g}")} if trusted < case.t_end else {}
     numbers = {
         metric: float(f"{value:.3g}") if math.isfinite(value) else str(value)  # JSON has no number for it
         for metric, value in sorted(found.items())
@@ -118,7 +136,8 @@ def write(runs: Iterable[Laid]) -> None:
     for label, head, who, run in runs:
         if label not in fresh:
             old = table.get(label, {})
-            kept = dict(old["runs"]) if {k: v for k, v in old.items() if k != "runs"} == head else {}
+            same = all(old.get(name) == head.get(name) for name in ("parameters", "compared"))
+            kept = dict(old["runs"]) if old and same else {}
             fresh[label] = head | {"runs": kept}
         fresh[label]["runs"][who] = run
     lines = [f"{json.dumps(label)}: {_block(runs)}" for label, runs in sorted((table | fresh).items())]

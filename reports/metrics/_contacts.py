@@ -6,13 +6,14 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED, Contact, contacts, rates
 from crossbody.reports.measuring.alignment import aligned, matched
 from crossbody.reports.measuring.equations import equations, finite, spread
-from crossbody.reports.measuring.friction import guard, turned
+from crossbody.reports.measuring.friction import SLOW, guard, rubbing, turned
 from crossbody.reports.measuring.impulse import away
 from crossbody.reports.measuring.instants import off
 from crossbody.reports.measuring.truth import Truth
@@ -22,7 +23,7 @@ UNITS = {
     "constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m",
     "slip_times": "s", "stick_times": "s",
 }  # fmt: skip
-NEEDS: dict[str, str] = {}
+NEEDS = {"mode_contradicted": "lam"}
 KNOWN = 1e-6
 """Part of the largest to which limits hold gaps and what releases leave of multipliers."""
 SHALLOW = 1e-12
@@ -108,6 +109,52 @@ def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
     scale = max(float(np.max(np.abs(wanted))), ROUNDING * float(np.max(np.abs(run.q[some]))))
     apart = float(np.max(np.abs(run.gap[some] - wanted)))
     return apart / scale if scale else apart
+
+
+def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Recorded modes against recorded gaps, forces and slips: samples whose mode they contradict.
+
+    Number of samples and rows at which an open row pushes, a FREE one is below its surface by more than the longest way
+    between samples, or a closed one is above by as much and bears nothing; at which friction is called SLIP below half
+    its bound, STICK beyond one and a half times it (pyramids in and around a cone of friction are within the root of
+    two), or STICK at its bound while it slips. Samples beside events are left out: a step has the force of either side.
+    It asks nothing of the truth or the law. None without rows and where modes are not known, NaN where lam is not.
+    """
+    if not run.mode.size or (run.mode < 0).any() or len(run.t) < 2:
+        return None
+    if np.isnan(run.lam).any():
+        return math.nan
+    quiet, light = _between_events(run), KNOWN * float(np.max(np.abs(run.lam)))
+    rows = case.law.unilateral
+    mode, gap, bears = run.mode[:, rows], run.gap[:, rows], np.abs(run.lam[:, rows]) > light
+    size = KNOWN * max(1.0, float(np.max(np.abs(run.q))))
+    near = np.maximum(size, np.max(np.abs(np.diff(gap, axis=0)), axis=0))
+    closed = np.isin(mode, CLOSED)
+    wrong = (~closed & bears) | ((mode == Mode.FREE) & (gap < -near)) | (closed & (gap > near) & ~bears)
+    return float(np.sum(wrong[quiet]) + np.sum(_other_friction(run, case, light)[quiet]))
+
+
+def _between_events(run: Trajectory) -> NDArray[np.bool_]:
+    """Return the samples (n,) that are neither at an event nor beside one, nor the first two."""
+    quiet = np.ones(len(run.t), dtype=bool)
+    quiet[:2] = False
+    at = np.array([event.t for event in run.events if np.isfinite(event.t)])
+    first, last = (np.searchsorted(run.t, at, side=side) for side in ("left", "right"))
+    for i, j in zip((first - 1).clip(0).tolist(), (last + 1).tolist(), strict=True):
+        quiet[i:j] = False
+    return quiet
+
+
+def _other_friction(run: Trajectory, case: Case, light: float) -> NDArray[np.bool_]:
+    """Return where (n, m) friction is not what its mode says; `light` is what is no force, N."""
+    if (found := rubbing(run, case)) is None:
+        return np.zeros((len(run.t), 0), dtype=bool)
+    bound, mode = found.mu * found.normal, run.mode[:, found.rows]
+    force, speed = np.linalg.norm(found.force, axis=-1), np.linalg.norm(found.slip, axis=-1)
+    weak, heavy = (bound > light) & (force < 0.5 * bound), force > 1.5 * bound + light
+    slips = (bound > light) & (force > (1.0 - KNOWN) * bound) & (speed > SLOW * float(speed.max(initial=0.0)))
+    wrong: NDArray[np.bool_] = ((mode == Mode.SLIP) & weak) | ((mode == Mode.STICK) & (heavy | slips))
+    return wrong
 
 
 def mode_times(truth: Truth, run: Trajectory, case: Case) -> float | None:

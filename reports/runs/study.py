@@ -18,7 +18,7 @@ from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import contacts, turning
 from crossbody.cases.scene_plain import plain
-from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.comparison import Entry, judged, unlike_stored
 from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import TRUTH, Truth
@@ -43,13 +43,23 @@ _ARROW = {str: pa.string(), float: pa.float64(), bool: pa.bool_()}
 def judge(results: Sequence[CaseResult], commands: Mapping[str, str]) -> list[Row]:
     """Verdicts of all cases; `commands` names what reproduces each case (by its label)."""
     try:
-        return [
-            row.row()
-            for result in results
-            for row in judged(result.case, result.entries, result.truth, commands[result.case.label], _begun)
-        ]
+        return [row for result in results for row in _judged(result, commands[result.case.label])]
     finally:
         watch.unlimited()
+
+
+def _judged(result: CaseResult, command: str) -> list[Row]:
+    """Verdicts of one case.
+
+    Raises:
+        RuntimeError: where a run has none: it would count as within.
+    """
+    found = judged(result.case, result.entries, result.truth, command, _begun)
+    rows = [row.row() for row in (*found, *unlike_stored(result.case, command))]
+    shown = {(row["engine"], row["profile"]) for row in rows}
+    if lost := [f"{one.engine}:{one.profile}" for one in result.entries if (one.engine, one.profile) not in shown]:
+        raise RuntimeError(f"{result.case.label}: nothing is said of {', '.join(lost)}.")
+    return rows
 
 
 def _begun(label: str) -> str:

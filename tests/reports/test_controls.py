@@ -13,7 +13,7 @@ import pytest
 from random_scenes import random_scene, random_state, with_own_laws
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Claim, Limit, Tier
+from crossbody.cases import Case, Claim, Limit, Mode, Tier
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
 from crossbody.reports.judging import audit, comparison, controls, planted, verdict
@@ -195,3 +195,52 @@ def test_faults_are_seen_in_whatever_unit_of_time_a_motion_is_fast(unit: float) 
     assert blind(case, truth) == []
     judge_ = comparison._Judge(case, comparison.JUDGED, replace(truth, grows=1e12), "")
     assert judge_.judged("event_times", 0.01 * case.t_end, "s", truth, 1.0).verdict == Word.OUTSIDE
+
+
+def test_a_word_that_a_judge_does_not_say_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert blind(BALL, TRUTH) == []
+    monkeypatch.setattr(comparison, "exit_code", lambda words, lost=(): int(Word.CRASHED in set(words)))
+    told = [row for row in blind(BALL, TRUTH) if row.metric == "exit code"]
+    assert told
+    assert {row.verdict for row in told} == {Word.CRASHED}  # which it does know
+
+
+@pytest.mark.parametrize("times", [0.5, 100.0])
+def test_numbers_beside_limits_that_are_judged_by_others_are_told(
+    monkeypatch: pytest.MonkeyPatch, times: float
+) -> None:
+    judge = verdict.judge
+
+    def wider(value: float, limit: Limit | None, *more: Any) -> tuple[Word, str]:
+        return judge(value, limit and replace(limit, value=times * limit.value), *more)
+
+    monkeypatch.setattr(comparison, "judge", wider)
+    assert {"position", "velocity", "event_times"} <= {row.metric for row in blind(BALL, TRUTH)}
+
+
+def test_limits_and_claims_are_those_of_the_stored_runs() -> None:
+    for case in (cases.load(name, variant) for name, variant in LABELS):
+        assert list(comparison.unlike_stored(case, "")) == []
+        wider = replace(case, limits=(*case.limits, Limit(metric="position", value=1e-4)))
+        other = replace(case, claims=(*case.claims, Claim(metric="transitions", expected=7.0, tier=Tier.A, source="")))
+        for changed in (wider, other):
+            assert [row.verdict for row in comparison.unlike_stored(changed, "")] == [Word.OUTSIDE]
+
+
+def test_every_run_has_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = jobs.run_case(BALL, (jobs.Pick(engine="reference", profile="compiled", every=False),), truth=TRUTH)
+    monkeypatch.setattr(study, "judged", lambda *_: [])
+    with pytest.raises(RuntimeError, match="nothing is said of reference:compiled"):
+        study.judge([result], {BALL.label: ""})
+
+
+@pytest.mark.parametrize(("name", "variant"), [("sliding_block", "stops"), ("red_body", "resolved")])
+def test_modes_that_gaps_and_forces_contradict_are_counted(name: str, variant: str) -> None:
+    case = cases.load(name, variant)
+    truth = truth_of(case)
+    measure = metrics.load("mode_contradicted").measure
+    assert measure(truth, truth.trajectory, case) == 0.0
+    swapped = np.array(truth.trajectory.mode)
+    for one, other in ((Mode.CONTACT, Mode.FREE), (Mode.SLIP, Mode.STICK)):
+        swapped[truth.trajectory.mode == one] = other
+    assert measure(truth, replace(truth.trajectory, mode=swapped), case) > 0.0
