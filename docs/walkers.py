@@ -17,8 +17,9 @@ from speed import markdown, replaced
 
 from crossbody import cases
 from crossbody.cases import Case, Tier
-from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.parts import Positions, splits
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.measuring.truth import Truth, shortened
 from crossbody.reports.runs.choice import picks

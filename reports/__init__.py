@@ -6,13 +6,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from crossbody.reports.judging.comparison import Entry, compare
+    from crossbody.reports.judging.comparison import compare
+    from crossbody.reports.judging.run_verdicts import Entry
     from crossbody.reports.judging.truth import truth_of
     from crossbody.reports.measuring.truth import Truth
 
 _LAZY = {
     "compare": "judging.comparison",
-    "Entry": "judging.comparison",
+    "Entry": "judging.run_verdicts",
     "Truth": "judging.truth",
     "truth_of": "judging.truth",
 }

@@ -23,7 +23,7 @@ from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Trajectory
 from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
-from crossbody.reports.judging.comparison import crash
+from crossbody.reports.judging.run_verdicts import crash
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.choice import Pick, of_case

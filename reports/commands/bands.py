@@ -12,7 +12,7 @@ from crossbody.cases import Case
 from crossbody.cases.defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging import stored
-from crossbody.reports.judging.comparison import Entry, measured
+from crossbody.reports.judging.run_verdicts import Entry, measured
 from crossbody.reports.judging.verdict import limit_for
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.runs import choice, jobs

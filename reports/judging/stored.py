@@ -18,7 +18,7 @@ from crossbody.cases import Case
 from crossbody.cases.defaults import limits_of
 
 if TYPE_CHECKING:
-    from crossbody.reports.judging.comparison import Entry
+    from crossbody.reports.judging.run_verdicts import Entry
 
 FILE = Path(__file__).with_name("stored.json")
 SAME_END = 0.01

@@ -153,7 +153,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     for k, (active, sliding, fast) in enumerate(patterns):
         at, rows = chosen[which.ravel() == k], np.flatnonzero(active)
         if not len(rows):  # dry friction that slides, which has no law but its bound
-            scale = max(scale, float(np.max(np.abs(run.lam[at]))))
+            scale = max(scale, float(np.max(np.asarray(system.friction)[sliding & system.dry], initial=0.0)))
             continue
         lam, moving = multipliers(system, case, run, at, rows, np.flatnonzero(sliding), fast, inputs)
         worst = max(worst, float(np.max(np.abs(_times(moving, run.lam[np.ix_(at, rows)] - lam)))))

@@ -17,11 +17,12 @@ from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
 from crossbody.reports.judging.audit import AuditRow, audit
-from crossbody.reports.judging.comparison import Entry, check_names, crash, judges_parts
+from crossbody.reports.judging.comparison import check_names, judges_parts
 from crossbody.reports.judging.covered import covered
 from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.parts import RATIO, Study
 from crossbody.reports.judging.reach import BUDGET, estimated, followed
+from crossbody.reports.judging.run_verdicts import Entry, crash
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch

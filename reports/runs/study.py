@@ -18,7 +18,8 @@ from crossbody.cases import Case, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import contacts, turning
 from crossbody.cases.scene_plain import plain
-from crossbody.reports.judging.comparison import Entry, judged, unlike_stored
+from crossbody.reports.judging.comparison import judged, unlike_stored
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import TRUTH, Truth

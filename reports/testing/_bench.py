@@ -13,8 +13,9 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, installed
 from crossbody.engines import Run
-from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
+from crossbody.reports.judging.run_verdicts import Entry, verdicts
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.judging.verdict import Verdict
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import jobs

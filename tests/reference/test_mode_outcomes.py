@@ -14,7 +14,7 @@ from crossbody import cases
 from crossbody.cases import Outcome, Tier
 from crossbody.cases.scene import Joint, RowLaw, Scene, Shape
 from crossbody.reference import simulate
-from crossbody.reports.judging.comparison import truth_row
+from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.measuring.truth import from_run
 
 CLEAR = 1e-3  # m/s^2, or of a determinant: below it the law is all but undecided

@@ -16,7 +16,7 @@ from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.engines.equations import system_of
 from crossbody.reference import Violation, recheck, simulate
 from crossbody.reports.judging import truth
-from crossbody.reports.judging.comparison import truth_row
+from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.judging.verdict import Word
 
 

@@ -16,7 +16,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Claim, Limit, Mode, Tier
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
-from crossbody.reports.judging import audit, comparison, controls, planted, verdict
+from crossbody.reports.judging import audit, comparison, controls, judge_controls, planted, run_verdicts, verdict
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.controls import unheard
 from crossbody.reports.judging.reach import followed
@@ -30,6 +30,7 @@ from crossbody.reports.runs.output import folder
 LABELS = (
     ("bouncing_ball", "elastic"), ("red_body", "resolved"), ("soft_contact", "delta"), ("sliding_block", "flat"),
     ("rolling_sphere", "side_spin"), ("held_weight", "sprung"), ("newtons_cradle", "unequal"),
+    ("dry_oscillator", "stops"),
 )  # fmt: skip
 BALL = cases.load("bouncing_ball", "elastic")
 TRUTH = truth_of(BALL)
@@ -37,7 +38,7 @@ TRUTH = truth_of(BALL)
 
 def blind(case: Case, truth: Truth) -> list[Verdict]:
     """The rows of controls, under the names of their metrics."""
-    rows = comparison._blind(case, shortened(truth), "")
+    rows = judge_controls.blind(case, shortened(truth), "")
     return [replace(row, metric=row.metric.removesuffix(" (control)")) for row in rows]
 
 
@@ -81,11 +82,11 @@ def test_a_metric_that_is_wrong_by_a_factor_is_told(name: str, factor: float, mo
 
 
 def test_a_verdict_or_a_cap_that_lets_faults_pass_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    own = comparison.judge
-    monkeypatch.setattr(comparison, "WIDEST", 1.0)
+    own = run_verdicts.judge
+    monkeypatch.setattr(run_verdicts, "WIDEST", 1.0)
     capped = {row.metric for row in blind(BALL, TRUTH)}
     monkeypatch.undo()
-    monkeypatch.setattr(comparison, "judge", lambda value, *more: own(0.0 * value, *more))
+    monkeypatch.setattr(run_verdicts, "judge", lambda value, *more: own(0.0 * value, *more))
     assert {row.metric for row in blind(BALL, TRUTH)} >= {"position", "velocity", "touch_count"}
     assert capped >= {"position", "velocity"}
 
@@ -131,9 +132,9 @@ def test_no_control_fails_on_random_scenes(seed: int) -> None:
 
 def test_a_limit_of_a_case_that_does_not_judge_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     tracks = cases.load("delta_tracking", "circle")
-    assert list(comparison._unruled(tracks)) == []
-    monkeypatch.setattr(comparison, "limits_of", lambda case: (*case.limits, *cases.defaults.default_limits(case)))
-    assert [name for name, _, _, _ in comparison._unruled(tracks)]
+    assert list(judge_controls._unruled(tracks)) == []
+    monkeypatch.setattr(judge_controls, "limits_of", lambda case: (*case.limits, *cases.defaults.default_limits(case)))
+    assert [name for name, _, _, _ in judge_controls._unruled(tracks)]
 
 
 def test_a_known_deviation_that_passes_in_any_size_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,7 +177,7 @@ def test_rows_of_the_truth_have_no_name_of_a_metric_and_stand_on_a_page(
     rows = study.judge([result], {case.label: "again"})
     mine = [row["metric"] for row in rows if row["engine"] == "truth" and row["metric"] != "truth"]
     assert set(mine) == {"largest position (step) (claim)", "velocity (control)"}
-    assert not set(mine) & {*metrics.of(case), *comparison.LARGEST_PARTS}
+    assert not set(mine) & {*metrics.of(case), *run_verdicts.LARGEST_PARTS}
     with folder(tmp_path / "out") as out:
         study.write(out, [result], rows, {"command": "crossbody run", "time": ""})
         site.write(out)
@@ -193,13 +194,13 @@ def test_faults_are_seen_in_whatever_unit_of_time_a_motion_is_fast(unit: float) 
     truth = truth_of(case)
     assert truth.trajectory.outcome.ok
     assert blind(case, truth) == []
-    judge_ = comparison._Judge(case, comparison.JUDGED, replace(truth, grows=1e12), "")
+    judge_ = run_verdicts.Judge(case, judge_controls.JUDGED, replace(truth, grows=1e12), "")
     assert judge_.judged("event_times", 0.01 * case.t_end, "s", truth, 1.0).verdict == Word.OUTSIDE
 
 
 def test_a_word_that_a_judge_does_not_say_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert blind(BALL, TRUTH) == []
-    monkeypatch.setattr(comparison, "exit_code", lambda words, lost=(): int(Word.CRASHED in set(words)))
+    monkeypatch.setattr(judge_controls, "exit_code", lambda words, lost=(): int(Word.CRASHED in set(words)))
     told = [row for row in blind(BALL, TRUTH) if row.metric == "exit code"]
     assert told
     assert {row.verdict for row in told} == {Word.CRASHED}  # which it does know
@@ -214,7 +215,7 @@ def test_numbers_beside_limits_that_are_judged_by_others_are_told(
     def wider(value: float, limit: Limit | None, *more: Any) -> tuple[Word, str]:
         return judge(value, limit and replace(limit, value=times * limit.value), *more)
 
-    monkeypatch.setattr(comparison, "judge", wider)
+    monkeypatch.setattr(run_verdicts, "judge", wider)
     assert {"position", "velocity", "event_times"} <= {row.metric for row in blind(BALL, TRUTH)}
 
 

@@ -20,8 +20,8 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines.mujoco._build import MAX_IMPEDANCE, without_regularisation
 from crossbody.reports import metrics
-from crossbody.reports.judging import comparison
-from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging import run_verdicts
+from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.parts import (
     LEAST_RATIO,
     Events,
@@ -34,6 +34,7 @@ from crossbody.reports.judging.parts import (
     splits,
 )
 from crossbody.reports.judging.reach import BUDGET
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, from_run
 from crossbody.reports.runs import choice, jobs
@@ -347,7 +348,7 @@ def test_parts_that_are_not_the_whole_error_are_outside(
         return {**found, metric: replace(found[metric], there=there)}
 
     case, result = ball
-    monkeypatch.setattr(comparison, "splits", off)
+    monkeypatch.setattr(run_verdicts, "splits", off)
     rows = {row.metric: row for row in judged(case, result.entries, result.truth, "crossbody run")}
     outside = {name for name, row in rows.items() if row.verdict is Word.OUTSIDE}
     assert outside == ({f"{metric} (parts)"} if told else set())

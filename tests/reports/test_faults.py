@@ -15,8 +15,9 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports import metrics
 from crossbody.reports.judging import stored
-from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.parts import PARTS
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.measuring.truth import Truth

@@ -17,9 +17,10 @@ from crossbody.cases.mechanisms.soft.claims import STEP
 from crossbody.cases.mechanisms.soft.form import fastest
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
-from crossbody.reports.judging import comparison
-from crossbody.reports.judging.comparison import EXACT, GROWING, judged
+from crossbody.reports.judging import run_verdicts
+from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.reach import tight
+from crossbody.reports.judging.run_verdicts import EXACT, GROWING
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Verdict, Word, limit_for
 from crossbody.reports.measuring.alignment import aligned
@@ -111,11 +112,11 @@ def test_limits_are_as_they_stand_but_for_what_was_asked_for(
         assert row.limit == pytest.approx(max(stands.value, min(stands.value * times, 1e-3)), rel=1e-9), row.metric
 
 
-def judge_of(name: str, variant: str, rtol: float) -> comparison._Judge:
+def judge_of(name: str, variant: str, rtol: float) -> run_verdicts.Judge:
     case = cases.load(name, variant)
     run = jobs.run_case(cases.load("bouncing_ball", "listing"), choice.picks(["reference:compiled"]), refine=False)
     entry = replace(run.entries[0], settings={"rtol": rtol})
-    return comparison._Judge(case, entry, run.truth, "run")
+    return run_verdicts.Judge(case, entry, run.truth, "run")
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-3])
@@ -159,7 +160,7 @@ def test_an_engine_that_tells_its_tolerance_where_it_is_asked_for_alone_is_judge
     judge_ = judge_of("bouncing_ball", "listing", 1e-7)
     silent = SimpleNamespace(planned=lambda case, profile: {})
     monkeypatch.setattr(engines, "load", lambda name: silent)
-    assert comparison.looser(judge_.case, judge_.entry) == pytest.approx(100.0)
+    assert run_verdicts.looser(judge_.case, judge_.entry) == pytest.approx(100.0)
 
 
 @pytest.mark.parametrize("name", ["bouncing_ball", "red_body", "sliding_block", "stacked_blocks"])

@@ -24,7 +24,7 @@ from crossbody.cases import OutputError, load
 from crossbody.reports.bench.order import observed_order
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.figures.styles import COLOURS, DASHES, style
-from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.told import share
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Verdict, Word

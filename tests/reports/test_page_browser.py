@@ -21,7 +21,7 @@ from crossbody.cases.scene import Body, Joint, Scene, Shape
 from crossbody.engines import load as load_engine
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Plot, Section
-from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.pages import figures, html, site
 from crossbody.reports.pages.html import Page

@@ -13,7 +13,7 @@ import pytest
 
 from crossbody.cases import load
 from crossbody.reports.figures.section import Figure, Plot, Section
-from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.pages import figures, html, precision, site
 from crossbody.reports.replay import figure as replays

@@ -17,10 +17,11 @@ from crossbody.cases import Case, Event, Mode, Outcome, Tier, Trajectory
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
 from crossbody.reports.judging import truth as judging
-from crossbody.reports.judging.comparison import Entry, truth_row, verdicts
 from crossbody.reports.judging.reach import BEFORE, LEAST, MANY, SHORT, SHORTEST, cut_short, followed, motion, tight
+from crossbody.reports.judging.run_verdicts import Entry, verdicts
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.truth import Truth, from_run, shortened
 from crossbody.reports.runs.choice import picks

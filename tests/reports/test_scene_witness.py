@@ -16,7 +16,7 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.reference.tree import system as tree
 from crossbody.reports.judging import truth as judging
-from crossbody.reports.judging.comparison import truth_row
+from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.judging.verdict import Word
 
 INERTIA = (0.02, 0.03, 0.04, 0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ import pytest
 
 from crossbody.cases import Case, load, names, variants
 from crossbody.reports.judging import stored
-from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.run_verdicts import Entry
 
 ENDS = (math.inf, 0.5)
 """Up to when a truth is known, s."""

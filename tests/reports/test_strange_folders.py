@@ -19,7 +19,7 @@ from ladder import ladder
 
 from crossbody.cases import OutputError, load
 from crossbody.reports.cli import main
-from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.pages import site
 from crossbody.reports.runs import files, manifest, store, study

@@ -20,12 +20,14 @@ from crossbody.cases.defaults import limits_of
 from crossbody.cases.files.case import AS_IT_STANDS
 from crossbody.reports import metrics
 from crossbody.reports.commands import bands
-from crossbody.reports.judging import comparison, stored, verdict
+from crossbody.reports.judging import run_verdicts, stored, verdict
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
-from crossbody.reports.judging.comparison import Entry, compare, judged, truth_row
+from crossbody.reports.judging.comparison import compare, judged
 from crossbody.reports.judging.parts import Split
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
+from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.judging.verdict import FACTOR, Regression, Word, as_stored, band, exit_code, judge, limit_for
 from crossbody.reports.measuring.truth import TRUTH, from_run
 from crossbody.reports.runs import jobs
@@ -78,7 +80,7 @@ def test_a_number_that_is_missing_has_one_word(
     }
     limits = () if not limit else (Limit(metric="contacts", value=1.0, why="because", **given[limit]),)
     entry = Entry(engine="fake", profile="good", run=motion, hidden={"lam": "not shown"} if hidden else {})
-    judge_ = comparison._Judge(replace(case, limits=limits, claims=(claim,) * claimed), entry, truth_of(case), "run")
+    judge_ = run_verdicts.Judge(replace(case, limits=limits, claims=(claim,) * claimed), entry, truth_of(case), "run")
     judge_.stored = {} if stored is None else {"contacts": stored}
     row = judge_.missing("contacts", "1", "There is no such number.", "lam")
     expected = 3.0 if claimed else math.nan
@@ -101,16 +103,16 @@ def test_what_is_stored_of_a_run_that_fails_its_audit_is_all_that_is_measured(ca
     """Judged it ends there, as no size is known yet."""
     row = AuditRow(quantity="M", mine="1", theirs="2", difference=0.5, tolerance=1e-9)
     entry, true = Entry(engine="fake", profile="good", run=motion), truth_of(case)
-    plain = comparison.measured(case, entry, true)
+    plain = run_verdicts.measured(case, entry, true)
     assert len(plain) > 5
     failed = replace(entry, audit=(row, replace(row, quantity="h", difference=0.0)))
-    assert comparison.measured(case, failed, true) == pytest.approx(plain | {"audit M": 0.5}, nan_ok=True)
+    assert run_verdicts.measured(case, failed, true) == pytest.approx(plain | {"audit M": 0.5}, nan_ok=True)
     assert {one.metric for one in judged(case, [failed], true, "") if one.engine == "fake"} == {"finished", "audit"}
 
 
 def test_a_number_of_the_stored_run_that_nobody_asks_for_any_more_is_outside(case: Case, motion: Trajectory) -> None:
     entry, true = Entry(engine="fake", profile="good", run=motion), truth_of(case)
-    judge_ = comparison._Judge(case, entry, true, "run")
+    judge_ = run_verdicts.Judge(case, entry, true, "run")
     judge_.stored = {
         "contacts": 3.0,
         "bounces": math.nan,
@@ -118,7 +120,7 @@ def test_a_number_of_the_stored_run_that_nobody_asks_for_any_more_is_outside(cas
         "audit M": 0.5,
         "largest position (x)": 1.0,
     }
-    [row] = comparison._vanished(judge_, {"transitions"})
+    [row] = run_verdicts._vanished(judge_, {"transitions"})
     assert (row.metric, row.verdict) == ("contacts", Word.OUTSIDE)
 
 
@@ -129,7 +131,7 @@ def test_a_small_part_says_as_much_of_a_deviation_as_that_of_the_stored_run(
     compared: float, value: float, word: Word, stored: float | None, case: Case, motion: Trajectory
 ) -> None:
     """A run by another law may share few events with the truth: what is within is not judged by them alone."""
-    judge_ = comparison._Judge(case, Entry(engine="fake", profile="good", run=motion), truth_of(case), "run")
+    judge_ = run_verdicts.Judge(case, Entry(engine="fake", profile="good", run=motion), truth_of(case), "run")
     judge_.limits = (replace(LIMIT, metric="x", known="it is known to do that", known_size=0.04),)
     judge_.stored = {} if stored is None else {"x": stored}
     if stored is not None and value == 1e-4:
@@ -153,8 +155,8 @@ def test_parts_that_do_not_add_up_to_their_error_are_a_row(
     if missing:
         del there["model"]
     told = Split(where="q", there=there, largest=there, known=there, says="", missing={})
-    judge_ = comparison._Judge(case, Entry(engine="fake", profile="good", own=own), true, "run")
-    rows = list(comparison._unlike(judge_, "position", told, sum(parts) + off))
+    judge_ = run_verdicts.Judge(case, Entry(engine="fake", profile="good", own=own), true, "run")
+    rows = list(run_verdicts._unlike(judge_, "position", told, sum(parts) + off))
     assert [row.verdict for row in rows] == [Word.OUTSIDE] * (abs(off) > 0.0 and trusted != 0.5 and not missing)
 
 
@@ -176,14 +178,14 @@ def test_a_number_that_is_none_is_told_if_it_is_asked_for_or_the_run_should_have
     limit, claim = replace(LIMIT, metric="x"), replace(CLAIM, metric="x")
     untold = {"lam": "not shown"} if hidden else {}
     true = from_run(replace(motion), Tier.A, "itself")
-    judge_ = comparison._Judge(case, Entry(engine="fake", profile="good", hidden=untold), true, "run")
+    judge_ = run_verdicts.Judge(case, Entry(engine="fake", profile="good", hidden=untold), true, "run")
     judge_.limits, judge_.claims, judge_.stored = (limit,) * limited, {"x": claim} if claimed else {}, {}
     metric: Any = SimpleNamespace(
         UNIT="1", measure=lambda _, run, __: value if run is motion else 1.0 if shown else None
     )
     if needs:
         metric.NEEDS = needs
-    row = comparison._row(judge_, metric, "x", claimed or limited, true, motion)
+    row = run_verdicts._row(judge_, metric, "x", claimed or limited, true, motion)
     lacks = value is None or (math.isnan(value) and needs and (hidden or not (claimed or limited)))
     if lacks and not claimed and not (limited and shown):
         assert row is None

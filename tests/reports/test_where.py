@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from crossbody.cases import Case, load
-from crossbody.reports.judging.comparison import Entry, judged
+from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.metrics import position

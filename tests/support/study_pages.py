@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from crossbody.cases import Case
 from crossbody.engines import Run
 from crossbody.reports.cli import main
-from crossbody.reports.judging.comparison import Entry
+from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.pages import site
 from crossbody.reports.runs import study

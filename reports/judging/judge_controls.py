@@ -1,0 +1,148 @@
+"""What a judge must say of runs and numbers of which the answer is known, asked in every run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from crossbody.cases import Case, Outcome, Trajectory
+from crossbody.cases.defaults import limits_of
+from crossbody.reports import metrics
+from crossbody.reports.judging.audit import AuditRow
+from crossbody.reports.judging.run_verdicts import REACHED, Entry, Judge, audited, finished, value_of, verdicts
+from crossbody.reports.judging.stored import changed, compared_until
+from crossbody.reports.judging.truth_row import of_truth, truth_row
+from crossbody.reports.judging.verdict import Regression, Verdict, Word, exit_code, limit_for
+from crossbody.reports.measuring.truth import Truth, before
+
+if TYPE_CHECKING:
+    from crossbody.reports.judging.controls import Blind
+
+JUDGED = Entry(engine="reference", profile="compiled")
+"""As whose the numbers of controls are judged: no known property explains its errors."""
+FAR = 1e12
+"""How many times its own horizon, and an error of its start, limits are asked to grow with."""
+UNLIMITED = ("creep_speed", "lam_error", "lam_impulse")
+"""Metrics that controls look at, and that are limited in some cases only."""
+
+
+def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
+    """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
+    from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
+    from crossbody.reports.judging.planted import PART
+
+    near = Judge(case, JUDGED, truth, command)
+    far = Judge(case, JUDGED, replace(truth, grows=FAR), command)
+    far.longer = FAR
+
+    def outside(name: str, value: float) -> bool:
+        rows = [near.judged(name, off, "", truth, 1.0) for off in (value, -value)]
+        unit = metrics.load(name).UNIT
+        if unit in ("1", "s") and near.longer == 1.0:  # other units have caps in their own
+            rows.append(far.judged(name, value if unit == "1" else PART * case.t_end, "", truth, 1.0))
+        if name == "position" and not math.isnan(truth.allowed):  # another source that is off so much is no witness
+            rows += truth_row(case, replace(truth, agreement={name: value}), command)
+        return all(row.verdict == Word.OUTSIDE for row in rows) or _lets_pass(case, name, value)
+
+    for name, value, (least, most), fault in (*unseen(case, truth, outside), *unheard(case), *_unruled(case)):
+        if least <= value <= most:
+            why = f"A control passes: {fault} is no number outside."
+        else:
+            why = f"A control is not seen as it is: {fault} must come out between {least:.3g} and {most:.3g}."
+        yield of_truth(case, f"{name} (control)", why, command, tier=truth.tier.value, value=value)
+    for name, fault in _unsaid(near):
+        word = next((one for one in WRONG if exit_code([one])), Word.OUTSIDE)
+        yield of_truth(case, f"{name} (control)", f"A control passes: {fault}.", command, verdict=word)
+
+
+WRONG = (Word.OUTSIDE, Word.CRASHED)
+BESIDE = 1e-3
+"""Part of a limit by which a number is beside it."""
+HALF = 0.5
+
+
+def _unsaid(judge_: Judge) -> Iterator[tuple[str, str]]:
+    """Yield what a judge does not say of runs and numbers of which it is known what must be said."""
+    yield from _unsaid_of_limits(judge_)
+    truth, run, entry = judge_.truth, judge_.truth.trajectory, judge_.entry
+    for word in Word:
+        if exit_code([Word.WITHIN, word]) != int(word in WRONG):
+            yield "exit code", f"it does not tell {word} as it must"
+    if exit_code([Word.WITHIN], [Regression.KEPT]) or not exit_code([Word.WITHIN], [Regression.KEPT, Regression.LOST]):
+        yield "exit code", "it does not tell what was lost"
+    for wanted, told in ((Word.CRASHED, {"crashed": "a fault"}), (Word.SKIPPED, {"skipped": "a reason"})):
+        rows = verdicts(judge_.case, replace(entry, **told), truth, "")  # type: ignore[arg-type]
+        if [row.verdict for row in rows] != [wanted]:
+            yield "run", f"one that is {wanted} is not"
+    short = before(run, HALF * float(run.t[-1]))
+    if finished(judge_, replace(short, outcome=Outcome.FINISHED)).verdict != Word.OUTSIDE:
+        yield "finished", "a run that ends halfway is not outside"
+    if finished(judge_, replace(run, outcome=Outcome.TIME_LIMIT)).verdict != Word.OUTSIDE:
+        yield "finished", "a run that says that it did not finish is not outside"
+    off = AuditRow(quantity="masses", mine="", theirs="", difference=BESIDE, tolerance=0.0)
+    same = replace(off, difference=0.0)
+    found = [audited(_of(judge_, audit=rows)).verdict for rows in ((same, off), (off, same), (same, same))]
+    if found != [Word.OUTSIDE, Word.OUTSIDE, Word.WITHIN]:
+        yield "audit", "other masses are not outside, or the same are"
+    known = replace(truth, at=lambda times: before(run, float(times[-1])) if len(times) else run)
+    compared = [value_of(_Last(), "position", known, one, judge_.case)[1] * judge_.case.t_end for one in (short, run)]
+    if any(
+        abs(a - min(float(b.t[-1]), truth.trusted)) > REACHED * judge_.case.t_end
+        for a, b in zip(compared, (short, run), strict=True)
+    ):
+        yield "compared", "it is not the part of the horizon for which the truth was asked"
+
+
+class _Last:
+    """A metric that asks for the truth at the end of a run."""
+
+    UNIT, CLAIMED = "1", False
+
+    def measure(self, truth: Truth, run: Trajectory, case: Case) -> float | None:
+        """Return nothing of it."""
+        truth.at(run.t)
+        return 0.0
+
+
+def _of(judge_: Judge, **more: Any) -> Judge:
+    """Return a judge of another entry."""
+    return Judge(judge_.case, replace(judge_.entry, **more), judge_.truth, "")
+
+
+def _unsaid_of_limits(judge_: Judge) -> Iterator[tuple[str, str]]:
+    """Yield limits of which numbers on either side, or none, are not said to be so."""
+    for name in dict.fromkeys([*judge_.claims, *(limit.metric for limit in judge_.limits)]):
+        claim, limit = judge_.claims.get(name), judge_.limit(name)
+        if name in ("*", "audit") or (limit is None and claim is None) or (limit is not None and limit.known):
+            continue
+        expected, most = 0.0 if claim is None else claim.expected, 0.0 if limit is None else limit.value
+        beside = BESIDE * (most or abs(expected) or 1.0)
+        wanted = [(expected + sign * (most + beside), Word.OUTSIDE) for sign in (1.0, -1.0)]
+        wanted += [(expected + sign * (most - beside), Word.WITHIN) for sign in (1.0, -1.0) if most > 0.0]
+        wanted += [(sign * math.inf, Word.OUTSIDE) for sign in (1.0, -1.0)] + [(math.nan, Word.OUTSIDE)]
+        wanted += [(-expected, Word.OUTSIDE)] if abs(expected) > most else []
+        for value, word in wanted:
+            if (found := judge_.judged(name, value, "", judge_.truth, 1.0).verdict) != word:
+                yield name, f"{value:g} is {found}, but must be {word}"
+                break
+        if judge_.missing(name, "", "", "").verdict != Word.OUTSIDE:
+            yield name, "a number that lacks is not outside"
+
+
+def _unruled(case: Case) -> Iterator[Blind]:
+    """Yield limits of a case that do not judge engines of which it says nothing else."""
+    own = {limit.metric: limit for limit in case.limits if (limit.engine, limit.profile) == ("*", "*")}
+    for name, limit in own.items():
+        found = limit_for(limits_of(case), name, "", "")
+        value = math.nan if found is None else found.value
+        if value != limit.value:
+            yield name, value, (limit.value, limit.value), "the limit of the case"
+
+
+def _lets_pass(case: Case, name: str, value: float) -> bool:
+    """Whether a case leaves a number unlimited, or one of one's own limits it so widely that faults pass."""
+    of_its_own = math.isnan(compared_until(case)) and not changed(case)
+    own = [limit for limit in case.limits if limit.metric == name and limit.covers(JUDGED.engine, JUDGED.profile)]
+    return name in UNLIMITED or (of_its_own and any(value <= limit.value or limit.known for limit in own))

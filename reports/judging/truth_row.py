@@ -1,0 +1,56 @@
+"""What a table says of the truth itself."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from crossbody.cases import Case
+from crossbody.reports.judging.stored import SAME_END, compared_until
+from crossbody.reports.judging.verdict import Regression, Verdict, Word
+from crossbody.reports.measuring.truth import TRUTH, Truth, shortened
+
+if TYPE_CHECKING:
+    pass
+
+
+def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
+    """Whether the sources of a truth agree as far as they must; none for a truth that has one source and was given.
+
+    One that is known less far than when runs were stored is worse than it was.
+    """
+    if math.isnan(truth.allowed):
+        return []
+    known = case.chaos or truth.horizon
+    until = case.t_end if known is None else min(known.until, case.t_end)
+    value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
+    short = truth.trusted < until
+    told = [] if known is None else [f"Known up to {until:.4g} s: {known.why}."]
+    told.append(f"{truth.source}.")
+    if many := truth.trajectory.counts.get("not_searched", 0):
+        told.append(
+            f"At {many} instant{'s' * (many > 1)} too many contacts could change to search for a second motion."
+        )
+    if short:
+        told.append(f"It must be trusted to {until:.4g} s.")
+    if truth.part < 1.0:
+        asked = case.t_end / truth.part
+        told.append(f"Followed to {case.t_end:.4g} s of {asked:.4g} s: {truth.short}.")
+    if lost := shortened(truth).trusted < compared_until(case) - SAME_END * case.t_end:
+        told.append(f"The stored runs were compared up to {compared_until(case):.4g} s.")
+    return [Verdict(
+        case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",
+        limit=truth.allowed, tier=truth.tier.value, why=" ".join(told), command=command,
+        verdict=Word.WITHIN if value <= truth.allowed and not short else Word.OUTSIDE,
+        regression=Regression.LOST if lost else "",
+        compared=truth.part * min(truth.trusted / case.t_end, 1.0),
+    )]  # fmt: skip
+
+
+def of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> Verdict:
+    """Return a row that is outside of no run: no metric has its name, so that nobody looks for one."""
+    said: dict[str, Any] = {"value": math.nan, "verdict": Word.OUTSIDE, "tier": ""} | more
+    return Verdict(
+        case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=metric, unit="", command=command,
+        why=why, **said,
+    )  # fmt: skip
