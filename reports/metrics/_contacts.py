@@ -115,7 +115,8 @@ def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None
     """Recorded modes against recorded gaps, forces and slips: samples whose mode they contradict.
 
     Number of samples and rows at which an open row pushes, a FREE one is below its surface by more than the longest way
-    between samples, or a closed one is above by as much and bears nothing; at which friction is called SLIP below half
+    between samples though the run has BALLISTIC ones (engines without call any FREE that does not push), or a closed
+    one is above by as much and bears nothing; at which friction is called SLIP below half
     its bound, STICK beyond one and a half times it (pyramids in and around a cone of friction are within the root of
     two), or STICK at its bound while it slips. Samples beside events are left out: a step has the force of either side.
     It asks nothing of the truth or the law. None without rows and where modes are not known, NaN where lam is not.
@@ -130,7 +131,8 @@ def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None
     size = KNOWN * max(1.0, float(np.max(np.abs(run.q))))
     near = np.maximum(size, np.max(np.abs(np.diff(gap, axis=0)), axis=0))
     closed = np.isin(mode, CLOSED)
-    wrong = (~closed & bears) | ((mode == Mode.FREE) & (gap < -near)) | (closed & (gap > near) & ~bears)
+    below = (mode == Mode.FREE) & (gap < -near) & (run.mode == Mode.BALLISTIC).any()
+    wrong = (~closed & bears) | below | (closed & (gap > near) & ~bears)
     return float(np.sum(wrong[quiet]) + np.sum(_other_friction(run, case, light)[quiet]))
 
 
