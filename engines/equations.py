@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -13,6 +14,7 @@ from typing import Any
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.installed import from_file
 from crossbody.cases.remembered import remembered
+from crossbody.cases.scene_contacts import unknown
 from crossbody.reference import System
 
 SYSTEMS = "crossbody.reference.systems"
@@ -50,7 +52,21 @@ def _built(build: Callable[..., System], parameters: Any, law: Any) -> System:
     return build(parameters, law)
 
 
-def system_of(case: Case, traced: bool | None = None) -> System:
+def system_of(case: Case) -> System:
+    """The mechanism with the law of its rows; its findings name shapes of a file that have none.
+
+    `covered` of the harness asks that of a motion; whoever takes the equations alone is told by every run of them.
+    """
+    made, lost = equations_of(case), unknown(case.scene) if case.file and case.scene is not None else {}
+    if not lost:
+        return made
+    (first, reason), more = next(iter(sorted((sorted(shapes), why) for shapes, why in lost.items()))), len(lost) - 1
+    others = f"; nor have {more} other pairs" if more > 1 else "; nor has another pair" if more else ""
+    told = f"Shapes {' and '.join(map(repr, first))} have no rows and pass through each other: {reason}{others}."
+    return replace(made, findings=(*made.findings, told))
+
+
+def equations_of(case: Case, traced: bool | None = None) -> System:
     """The mechanism with the law of its rows: kernels of its own, where there are some, or those of every scene.
 
     Args:

@@ -17,7 +17,7 @@ from crossbody.engines import settings as _settings
 from crossbody.engines._rolling import determined
 from crossbody.engines._scene import masses
 from crossbody.engines.contract import Engine, Run
-from crossbody.engines.equations import known, module, system_of
+from crossbody.engines.equations import equations_of, known, module
 from crossbody.reference import Options, System, prepare
 from crossbody.reference.options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
 from crossbody.reference.start import NOT_FOUND, OffRowsError
@@ -199,7 +199,7 @@ class Reference(Engine):
                 (`Case.consistent`).
         """
         solver, used, options = self._chosen(case, profile, settings)
-        system = system_of(case, TRACED[str(used.get("traced", KEPT))])
+        system = equations_of(case, TRACED[str(used.get("traced", KEPT))])
         if (check := getattr(module(case.mechanism), "check_start", None)) is not None:
             check(case.parameters, case.q0, case.v0)
         try:

@@ -22,6 +22,7 @@ from crossbody.reference.kinds import Bytes, Floats, Index
 from crossbody.reference.systems import absent
 
 LARGEST = 1_000_000  # of every size of a system
+SLIPPERY = float(np.finfo(float).tiny)  # the coefficient in place of 0: rows slide with forces that no sum feels
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
@@ -245,8 +246,8 @@ class System:
                 )
             if follows[normal] >= 0 or not np.asarray(self.unilateral)[normal]:
                 raise SceneError(f"Row {normal} has friction; it must be able to open and follow no other.")
-            if given[rows[0]] > 0.0:
-                first[normal], count[normal], mu[normal] = rows[0], len(rows), given[rows[0]]
+            # Rows without friction slide as well: left out here they would be held as long as the contact presses.
+            first[normal], count[normal], mu[normal] = rows[0], len(rows), max(given[rows[0]], SLIPPERY)
         wrong = dry & ((np.asarray(self.unilateral) == 0) | ((follows >= 0) & (follows != own)))
         wrong |= dry & np.isin(own, follows[(follows >= 0) & (follows != own)])
         if np.any(wrong):

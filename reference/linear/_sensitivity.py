@@ -181,6 +181,7 @@ class _Walk:
         self.modes = initial_modes(system, at.q, at.v).astype(int).tolist()
         self.jumps: list[Jump] = []
         self.message = ""
+        self.refusal: SceneError | None = None
         slipped, still = slip_speeds(at, run), max(STILL, NOISE * rtol)
         self.slipping = Slipping(
             system=system, over=over, run=run, place=_placed, slipped=slipped, still=still,
@@ -240,7 +241,7 @@ class _Walk:
             here = self._here(start)
             ends, stiff = self.slipping.turns(here)
             watched = self.slipping.watches(here)
-            y = np.concatenate([self.x, self.S.ravel()])
+            y, self.refusal = np.concatenate([self.x, self.S.ravel()]), None
             size = np.concatenate([np.ones(len(self.x)), np.full(self.S.size, np.abs(self.S).max())])
             how: Any = {"method": "Radau", "jac": self._jacobian(here)} if stiff else {"method": "DOP853"}
             done: Any = solve_ivp(
@@ -248,6 +249,8 @@ class _Walk:
                 events=[*(slope for _, slope in watched), *ends], **how,
             )  # fmt: skip
             if done.status < 0:
+                if self.refusal is not None:
+                    raise self.refusal
                 self.message = f"The derivative was lost at t = {done.t[-1]:.9g} s: {done.message}"
                 return False
             for (left, _), times, states in zip(watched, done.t_events or (), done.y_events or (), strict=False):
@@ -273,7 +276,8 @@ class _Walk:
                 return lost
             try:
                 f, slope = flow(moved, self.over)
-            except NoDirectionError:  # a trial step to where a slip is zero, which is too long
+            except SceneError as error:  # a trial step beyond the arc's end, or else one that no shorter step avoids
+                self.refusal = None if isinstance(error, NoDirectionError) else error
                 return lost
             S = y[nq + n :].reshape(shape)
             tangent = S[n:]

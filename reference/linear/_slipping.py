@@ -9,6 +9,7 @@ sticks would slip die out within times of their own size.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,7 +21,7 @@ from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._derivatives import saddle
 from crossbody.reference.linear._emerging import emerges, emerging
 from crossbody.reference.linear._point import Point, gaps
-from crossbody.reference.linear._rubbing import given_way, independent
+from crossbody.reference.linear._rubbing import NoDirectionError, given_way, independent
 from crossbody.reference.linear._variation import (
     Theta,
     cone_gradient,
@@ -160,8 +161,13 @@ class Slipping:
         return found
 
     def _watch(self, here: Point, left: Callable[[Point], tuple[float, float]]) -> tuple[Callable[[Point], float], Any]:
+        last = -1.0
+
         def slope(t: float, y: Floats) -> float:
-            return left(self.place(here, t, y))[1]
+            nonlocal last
+            with suppress(NoDirectionError):  # a slip has come to zero, where the arc ends: nothing comes nearer there
+                last = left(self.place(here, t, y))[1]
+            return last
 
         slope.terminal, slope.direction = False, 1.0  # type: ignore[attr-defined]
         return lambda at: left(at)[0], slope

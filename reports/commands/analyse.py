@@ -11,6 +11,7 @@ import pandas as pd
 
 from crossbody import cases
 from crossbody.cases import InvalidValue
+from crossbody.cases.files.case import rubbing
 from crossbody.reports import layout, voice
 from crossbody.reports.analysis import bode as curves
 from crossbody.reports.analysis import numbers as work
@@ -70,7 +71,10 @@ def analyse(
     """
     overrides, place = choice.parse_settings(pairs), parse_place(at)
     case = cases.load(name, variant, **overrides)
+    case = rubbing(case) or case  # an equilibrium may rest on contacts that slide
     found = places(case, place)
+    for text in dict.fromkeys(text for one in found for text in one.system.findings):
+        voice.note(text)
     engines, engine_poles = counterparts(found)
     tables = {
         "equilibria": work.equilibria(found, case), "poles": work.poles(found), "ranks": work.ranks(found),
@@ -126,7 +130,8 @@ def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
     for place, why in tables["refusals"].itertuples(index=False) if "refusals" in tables else ():
         click.echo(layout.told(f"{place}: {why}"))
     engines = tables["engines"]
-    told = engines.assign(way=engines["engine"] + ": " + engines["way"])[BESIDE].head(SHOWN)
+    ways = [f"{who}: {way}" if isinstance(way, str) else who for who, way in engines[["engine", "way"]].to_numpy()]
+    told = engines.assign(way=ways)[BESIDE].head(SHOWN)
     print_rows(told, 2, f"{label}: differences of engines\n", above="place")
     for why in engines["why"].dropna().unique():
         if why:

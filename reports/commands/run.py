@@ -124,11 +124,11 @@ def findings(case: Case) -> tuple[str, ...]:
     """Return sentences on what is strange in a case, and in the equations of a scene with loops."""
     if case.scene is None or not case.scene.loops:
         return case.findings
-    from crossbody.engines.equations import known, system_of
+    from crossbody.engines.equations import equations_of, known
 
     if not known(case):
         return case.findings
-    return (*case.findings, *system_of(case).findings)
+    return (*case.findings, *equations_of(case).findings)
 
 
 def repeat(

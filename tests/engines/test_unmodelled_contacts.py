@@ -14,6 +14,9 @@ from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, Outcome
 from crossbody.cases.files.contacts import _why
 from crossbody.cases.scene_contacts import unknown
+from crossbody.engines.equations import system_of
+from crossbody.reference import simulate
+from crossbody.reports.commands.analyse import analyse
 from crossbody.reports.runs import choice, jobs
 
 GATE = """<mujoco><option gravity="0 0 {gravity}"/><worldbody>
@@ -96,3 +99,35 @@ def test_a_hull_without_friction_has_too_many_corners() -> None:
         'condim="1"/><body><freejoint/><geom type="mesh" mesh="ball" condim="1"/></body></worldbody></mujoco>'
     )
     assert _why(model, (0, 1), {}).startswith("the hull has more than 256 corners")
+
+
+BOX = """<mujoco><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+  <body name="box" pos="0 0 {height}"><freejoint/><geom name="box" type="box" size=".1 .1 .1" mass="1"
+  condim="{condim}"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(("condim", "friction", "reason"), [(3, -1, "friction=1 has it"), (4, 1, "torsional")])
+def test_equations_of_a_file_say_whose_contacts_they_leave_out(
+    condim: int, friction: int, reason: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "box.xml"
+    path.write_text(BOX.format(height=0.2, condim=condim), encoding="utf-8")
+    case = cases.load(str(path), friction=friction)
+    run = simulate(system_of(case), case.q0, case.v0, 0.5)
+    assert run.q[-1, 2] < 0.0  # through the floor
+    assert "'box' and 'floor' have no rows and pass through each other" in run.message
+    assert reason in run.message
+
+
+def test_an_equilibrium_of_a_file_rests_on_contacts_that_slide(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "box.xml"
+    path.write_text(BOX.format(height=0.1, condim=3), encoding="utf-8")
+    analyse(str(path), None, [], [], bode=False, locus=None, mapped=False, out=None, command="")
+    told = capsys.readouterr()
+    assert "held by floor:box" in told.out
+    assert "no rows" not in told.err
+    path.write_text(BOX.format(height=0.1, condim=4), encoding="utf-8")
+    analyse(str(path), None, [], [], bode=False, locus=None, mapped=False, out=None, command="")
+    assert "have no rows" in " ".join(capsys.readouterr().err.split())

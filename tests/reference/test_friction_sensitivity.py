@@ -211,6 +211,16 @@ def test_a_slide_out_of_sticking_that_lifts_at_once():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("mu", [1.5, 2.0])
+def test_a_stop_beyond_which_the_rod_would_jam(mu):
+    """A trial step past the stop meets the opposite slip, which jams; the motion does not."""
+    rod = rod_on_floor(mu)
+    made = system(rod, case_of(rod).law)
+    q = np.array([0.0, 0.0, 0.6])
+    q[1] -= made.gap(q, np.zeros(3))[0].min()
+    assert compared(made, q, np.array([0.3, 0, 0]), 0.1, ways=0).outcome is Outcome.FINISHED
+
+
 def test_a_slide_of_nanoseconds_is_refused():
     """Of 85 out of sticking: its slip never comes out of the rounding of the velocities."""
     scene, q, v, _ = tossed(1, most=1)

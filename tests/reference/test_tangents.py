@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from friction_scenes import pair
+from friction_scenes import point as mass_point
 from scipy.spatial.transform import Rotation
 
+from crossbody.cases import Outcome
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene, Shape
 from crossbody.cases.scene_contacts import PLACES
 from crossbody.engines._contacts import Contacts
 from crossbody.engines.nearest import across
+from crossbody.reference import simulate
 from crossbody.reference.tree.system import system
 
 NAMES = ("one", "two")
@@ -104,3 +107,15 @@ def agree(rng: np.random.Generator, scene: Scene, x: np.ndarray, turns: Rotation
         np.testing.assert_allclose(Hdv[rows], slopes[place], rtol=0.0, atol=1e-8 * np.abs(slopes[place]).max())
         count += 1
     return count
+
+
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+@pytest.mark.parametrize("v", [[1.0, -1.0], [1.0, 0.5, -1.0], [0.0, 0.0, -1.0]])
+def test_a_point_without_friction_slides_on(v: list[float], solver: str) -> None:
+    """Rows of mu = 0 are tangential rows that bear nothing, not rows that hold while the contact presses."""
+    made = mass_point(0.0, 0.0, space=len(v) == 3)
+    run = simulate(made, [*np.zeros(len(v) - 1), 0.1], v, 0.3, solver=solver)
+    assert run.outcome is Outcome.FINISHED
+    assert run.events
+    np.testing.assert_allclose(run.v[-1, :-1], v[:-1], atol=1e-12)
+    np.testing.assert_allclose(run.lam[:, 1:], 0.0, atol=1e-300)
