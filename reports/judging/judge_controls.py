@@ -76,6 +76,10 @@ def _unsaid(judge_: Judge) -> Iterator[tuple[str, str]]:
         rows = verdicts(judge_.case, replace(entry, **told), truth, "")  # type: ignore[arg-type]
         if [row.verdict for row in rows] != [wanted]:
             yield "run", f"one that is {wanted} is not"
+    for name, unit in (("position", 1.0), ("event_times", judge_.case.t_end)):
+        apart = {"position": 0.0, name: 2.0 * truth.allowed * unit}
+        if any(row.verdict != Word.OUTSIDE for row in truth_row(judge_.case, replace(truth, agreement=apart), "")):
+            yield "truth", f"sources whose {name} differ twice as much as they may are said to agree"
     short = before(run, HALF * float(run.t[-1]))
     if finished(judge_, replace(short, outcome=Outcome.FINISHED)).verdict != Word.OUTSIDE:
         yield "finished", "a run that ends halfway is not outside"
