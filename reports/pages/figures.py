@@ -413,7 +413,7 @@ NOTES = {
         "ends is drawn."
     ),
     "force": (
-        "A small delay of an impact changes lam a lot at one instant, but hardly its impulse: "
+        "A small delay of an impact changes the force a lot at one instant, but hardly its impulse: "
         "judge by the impulse. Instantaneous collisions are steps of the impulse."
     ),
 }
