@@ -391,9 +391,9 @@ def _normals(names: Sequence[str]) -> list[str]:
 def _same(traces: Sequence[Trace]) -> Iterator[str]:
     names = traces[0].about["contacts"]
     same = [[names[first], *_normals([names[k] for k in (first, *rest)])[1:]] for first, *rest in alike(traces)]
-    groups = [f"{few(rest, 3)} as {first}" for first, *rest in same if rest]
+    groups = [f"same as {first}: {few(rest, 3)}" for first, *rest in same if rest]
     if groups:
-        yield f"Alike: {'; '.join(groups[:NAMED])}{f'; and {len(groups) - NAMED} more' * (len(groups) > NAMED)}."
+        yield f"The {'; the '.join(groups[:NAMED])}{f'; and {len(groups) - NAMED} more' * (len(groups) > NAMED)}."
 
 
 def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
@@ -413,7 +413,7 @@ NOTES = {
         "ends is drawn."
     ),
     "force": (
-        "A small delay of an impact changes lam a lot at one instant, but hardly its impulse: "
+        "A small delay of an impact changes the force a lot at one instant, but hardly its impulse: "
         "judge by the impulse. Instantaneous collisions are steps of the impulse."
     ),
 }

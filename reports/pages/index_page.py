@@ -13,7 +13,7 @@ import numpy as np
 
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import look
-from crossbody.reports.judging.told import WRONG, runs_of, sentence, share
+from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
@@ -169,6 +169,7 @@ def _tiles(found: Results) -> dict[str, Any]:
     """Counts of all verdicts, and sentences of warning."""
     counts = Counter(row["verdict"] for row in found.verdicts)
     words = {word: counts[word] for word in (*reversed(grid.WORST), Word.SKIPPED.value)}
+    loose = sum(map(beyond, found.verdicts))
     profiles = len({row["who"] for row in found.verdicts if row["engine"] != TRUTH})
     failed = sum(row["metric"] == "audit" and row["verdict"] == Word.OUTSIDE for row in found.verdicts)
     named = ((len(found.cases), "case"), (profiles, "engine profile"))
@@ -176,6 +177,8 @@ def _tiles(found: Results) -> dict[str, Any]:
         *({"value": n, "title": name if n == 1 else f"{name}s", "word": ""} for n, name in named),
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
+    if loose:
+        tiles.append({"value": loose, "title": "beyond a limit, not judged", "word": Word.INFO.value})
     if failed:
         tiles.append({"value": failed, "title": "failed parity audits", "word": Word.OUTSIDE.value})
     return {"tiles": tiles, "warnings": [text for text in (_version(found),) if text]}

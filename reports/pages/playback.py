@@ -26,7 +26,7 @@ BLOWS = 200
 """Impulses of one engine that are drawn, and events that one steps through, evenly chosen of more."""
 TEXT = (
     "All engines at the same time, which the plots below share. Arrows are contact forces, with "
-    "lengths proportional to lam; each shows the largest force since the previous frame, so "
+    "lengths proportional to the force; each shows the largest force since the previous frame, so "
     "that no impact is missed. An instantaneous collision has an impulse instead of a force: a "
     "hollow arrow that fades. Differences from the truth can be exaggerated 10 and 100 times."
 )

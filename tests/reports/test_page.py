@@ -364,6 +364,23 @@ def test_what_is_beyond_a_limit_for_a_known_cause_is_as_warm_and_as_high_as_what
         assert line.cells[0].heat >= 0
 
 
+@pytest.mark.parametrize("loose", [0, 1, 3])
+def test_the_index_counts_what_is_beyond_a_limit_though_it_is_not_judged(
+    tmp_path: Path, result: CaseResult, loose: int
+) -> None:
+    """Else a run of which nothing is outside would look as if all of it were within."""
+    rows = study.judge([result], {result.case.label: "crossbody run"})
+    held = [i for i, row in enumerate(rows) if row["verdict"] in grid.WORST and row["limit"]]
+    for i, row in enumerate(rows):
+        if i in held[:loose]:
+            rows[i] = row | {"verdict": Word.INFO, "value": 7.0 * row["limit"]}
+        elif row["verdict"] == Word.INFO:
+            rows[i] = row | {"limit": None}
+    text = (made(tmp_path / "out", [result], rows) / "index.html").read_text()
+    told = re.findall(r"<strong>(\d+)</strong> beyond a limit, not judged", text)
+    assert told == ([str(loose)] if loose else [])
+
+
 def test_what_is_farthest_out_stands_first(out: Path) -> None:
     text = (out / CASE).read_text().replace("<wbr>", "")
     body = text[text.index('--glance">') :]

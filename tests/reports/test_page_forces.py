@@ -179,7 +179,7 @@ def test_tangential_rows_of_named_contacts_are_not_named(run: Trajectory) -> Non
     names = ["floor", "a", "b", "a t1", "a t2", "b t1", "floor t1"]
     found = replace(found, about=found.about | {"contacts": names}, truth=None)
     assert note("force", [found]).endswith("Without force in every run: a, b, floor t1.")
-    assert note("modes", [found]).startswith("Alike: a, b as floor.")
+    assert note("modes", [found]).startswith("The same as floor: a, b.")
 
 
 def test_an_engine_without_an_account_is_named(run: Trajectory) -> None:
