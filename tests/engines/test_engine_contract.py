@@ -255,6 +255,6 @@ def test_a_dry_run_builds_nothing_of_the_reference(monkeypatch: pytest.MonkeyPat
     def build(*_: object, **__: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr("crossbody.engines.reference.system_of", build)
+    monkeypatch.setattr("crossbody.engines.reference.equations_of", build)
     assert {profile: dict(engine.planned(case, profile)) for profile in told} == told
     assert tell(["bouncing_ball"], ["reference"], None, (), None, (), tmp_path / "out", None, (), 0.0) == 0

@@ -228,6 +228,17 @@ def by_sign(s: Scene) -> tuple[Trajectory, float, float]:
     return replace(s.run, gap=gap, events=(), mode=0 * s.run.mode - 1), touch, release
 
 
+def called_free(s: Scene) -> tuple[Trajectory, float]:
+    """Some rows that push, called free at samples that are not beside an event."""
+    t, lam, mode = s.run.t, s.run.lam, s.run.mode.copy()
+    quiet = [k for k in range(4, len(t) - 4) if not any(t[k - 3] <= e.t <= t[k + 3] for e in s.run.events)]
+    pushing = [(k, i) for k in quiet for i in np.flatnonzero(lam[k] > 1e-3 * lam.max()).tolist()]
+    chosen = {pushing[s.one(range(len(pushing)))] for _ in range(3)}
+    for k, i in chosen:
+        mode[k, i] = Mode.FREE
+    return replace(s.run, mode=mode), float(len(chosen))
+
+
 def touch_by_sign(s: Scene) -> tuple[Trajectory, float]:
     return by_sign(s)[:2]
 
@@ -259,6 +270,7 @@ VALUES: dict[str, tuple[str, Known]] = {
     "flange_end": ("block", value("q", lambda s, run: run.q[-1, place(s, "flange")])),
     "foot_lam": ("box", standing),
     "leave_angle": ("edge", leaving(lambda angle, _, __: float(np.cos(angle)))),
+    "mode_contradicted": ("box", called_free),
     "mode_order": ("box", ordered),
     "pattern_distance": ("sliders", pattern),
     "pattern_distance of pendulums": ("pendulums", swung),
