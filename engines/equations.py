@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -58,12 +58,15 @@ def system_of(case: Case) -> System:
     `covered` of the harness asks that of a motion; whoever takes the equations alone is told by every run of them.
     """
     made, lost = equations_of(case), unknown(case.scene) if case.file and case.scene is not None else {}
-    if not lost:
-        return made
-    (first, reason), more = next(iter(sorted((sorted(shapes), why) for shapes, why in lost.items()))), len(lost) - 1
+    return replace(made, findings=(*made.findings, _left_out(lost))) if lost else made
+
+
+def _left_out(lost: Mapping[frozenset[str], str]) -> str:
+    """Say which shapes have no rows and why, of the first pair by name, and how many more."""
+    first, reason = min((sorted(shapes), why) for shapes, why in lost.items())
+    more = len(lost) - 1
     others = f"; nor have {more} other pairs" if more > 1 else "; nor has another pair" if more else ""
-    told = f"Shapes {' and '.join(map(repr, first))} have no rows and pass through each other: {reason}{others}."
-    return replace(made, findings=(*made.findings, told))
+    return f"Shapes {' and '.join(map(repr, first))} have no rows and pass through each other: {reason}{others}."
 
 
 def equations_of(case: Case, traced: bool | None = None) -> System:

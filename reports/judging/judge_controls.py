@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases.defaults import limits_of
@@ -66,30 +66,52 @@ HALF = 0.5
 def _unsaid(judge_: Judge) -> Iterator[tuple[str, str]]:
     """Yield what a judge does not say of runs and numbers of which it is known what must be said."""
     yield from _unsaid_of_limits(judge_)
-    truth, run, entry = judge_.truth, judge_.truth.trajectory, judge_.entry
+    yield from _unsaid_by_exit_codes()
+    yield from _unsaid_of_sources(judge_)
+    yield from _unsaid_of_runs(judge_)
+    yield from _unsaid_of_audits(judge_)
+
+
+def _unsaid_by_exit_codes() -> Iterator[tuple[str, str]]:
+    """Yield words that an exit code does not tell as it must."""
     for word in Word:
         if exit_code([Word.WITHIN, word]) != int(word in WRONG):
             yield "exit code", f"it does not tell {word} as it must"
     if exit_code([Word.WITHIN], [Regression.KEPT]) or not exit_code([Word.WITHIN], [Regression.KEPT, Regression.LOST]):
         yield "exit code", "it does not tell what was lost"
-    for wanted, told in ((Word.CRASHED, {"crashed": "a fault"}), (Word.SKIPPED, {"skipped": "a reason"})):
-        rows = verdicts(judge_.case, replace(entry, **told), truth, "")  # type: ignore[arg-type]
-        if [row.verdict for row in rows] != [wanted]:
-            yield "run", f"one that is {wanted} is not"
+
+
+def _unsaid_of_sources(judge_: Judge) -> Iterator[tuple[str, str]]:
+    """Yield in what the sources of a truth may differ without its row being outside."""
+    truth = judge_.truth
     for name, unit in (("position", 1.0), ("event_times", judge_.case.t_end)):
         apart = {"position": 0.0, name: 2.0 * truth.allowed * unit}
         if any(row.verdict != Word.OUTSIDE for row in truth_row(judge_.case, replace(truth, agreement=apart), "")):
             yield "truth", f"sources whose {name} differ twice as much as they may are said to agree"
+
+
+def _unsaid_of_audits(judge_: Judge) -> Iterator[tuple[str, str]]:
+    """Yield what is not said of an audit that differs in its first row, its last, or none."""
+    off = AuditRow(quantity="masses", mine="", theirs="", difference=BESIDE, tolerance=0.0)
+    same = replace(off, difference=0.0)
+    entries = [replace(judge_.entry, audit=rows) for rows in ((same, off), (off, same), (same, same))]
+    found = [audited(Judge(judge_.case, one, judge_.truth, "")).verdict for one in entries]
+    if found != [Word.OUTSIDE, Word.OUTSIDE, Word.WITHIN]:
+        yield "audit", "other masses are not outside, or the same are"
+
+
+def _unsaid_of_runs(judge_: Judge) -> Iterator[tuple[str, str]]:
+    """Yield what is not said of runs that crashed, were skipped, end early, or are compared in part."""
+    truth, run, entry = judge_.truth, judge_.truth.trajectory, judge_.entry
+    for wanted, told in ((Word.CRASHED, {"crashed": "a fault"}), (Word.SKIPPED, {"skipped": "a reason"})):
+        rows = verdicts(judge_.case, replace(entry, **told), truth, "")  # type: ignore[arg-type]
+        if [row.verdict for row in rows] != [wanted]:
+            yield "run", f"one that is {wanted} is not"
     short = before(run, HALF * float(run.t[-1]))
     if finished(judge_, replace(short, outcome=Outcome.FINISHED)).verdict != Word.OUTSIDE:
         yield "finished", "a run that ends halfway is not outside"
     if finished(judge_, replace(run, outcome=Outcome.TIME_LIMIT)).verdict != Word.OUTSIDE:
         yield "finished", "a run that says that it did not finish is not outside"
-    off = AuditRow(quantity="masses", mine="", theirs="", difference=BESIDE, tolerance=0.0)
-    same = replace(off, difference=0.0)
-    found = [audited(_of(judge_, audit=rows)).verdict for rows in ((same, off), (off, same), (same, same))]
-    if found != [Word.OUTSIDE, Word.OUTSIDE, Word.WITHIN]:
-        yield "audit", "other masses are not outside, or the same are"
     known = replace(truth, at=lambda times: before(run, float(times[-1])) if len(times) else run)
     compared = [value_of(_Last(), "position", known, one, judge_.case)[1] * judge_.case.t_end for one in (short, run)]
     if any(
@@ -108,11 +130,6 @@ class _Last:
         """Return nothing of it."""
         truth.at(run.t)
         return 0.0
-
-
-def _of(judge_: Judge, **more: Any) -> Judge:
-    """Return a judge of another entry."""
-    return Judge(judge_.case, replace(judge_.entry, **more), judge_.truth, "")
 
 
 def _unsaid_of_limits(judge_: Judge) -> Iterator[tuple[str, str]]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.truth import taken
+
+if TYPE_CHECKING:
+    from crossbody.reference import System
 
 PART = 0.02
 """Part of the largest by which a signal is off: no limit on a motion may be as wide."""
@@ -324,7 +328,6 @@ def modes(plain: Plain) -> Iterator[Control]:
         for i in plain.samples(presses)[:1]:
             freed = _with(run, "mode", (i, int(k)), Mode.FREE)
             yield Control(fault=f"row {k} presses while FREE", run=freed, sees={"mode_contradicted": exactly(1.0)})
-            break
     rows, ways, bound = _bounds(plain.case, run)
     for k, row in enumerate(rows):
         slides = still & (run.mode[:, row] == Mode.SLIP) & (bound[:, k] > FAR * float(np.max(np.abs(run.lam))))
@@ -340,8 +343,8 @@ def _slips(plain: Plain, i: int, way: slice) -> bool:
     system, run = equations(plain.case), plain.run
     if system is None:
         return False
-    slip = (system.gap(run.q[i], run.v[i])[1] - np.asarray(system.drift, dtype=np.float64))[way]
-    return float(np.linalg.norm(slip)) > TENTH * float(np.max(np.abs(run.v)))
+    slip = float(np.linalg.norm(_rates(system, run.q[i], run.v[i])[way]))
+    return slip > TENTH * float(np.max(np.abs(run.v)))
 
 
 def _last_contact(plain: Plain) -> tuple[int, float, float] | None:
@@ -441,8 +444,7 @@ def _shows(plain: Plain, event: Event, t: float) -> bool:
         below = np.abs(bound[:, k] - np.linalg.norm(run.lam[:, ways[k]], axis=1))
         return bool(below[i] > FAR * float(bound[:, k].max()))
     some = [i, *range(0, len(run.t), -(-len(run.t) // FEW))]
-    drift = np.asarray(system.drift, dtype=np.float64)
-    slips = [float(np.linalg.norm((system.gap(run.q[j], run.v[j])[1] - drift)[ways[k]])) for j in some]
+    slips = [float(np.linalg.norm(_rates(system, run.q[j], run.v[j])[ways[k]])) for j in some]
     return slips[0] > FAR * max(slips)
 
 
@@ -498,10 +500,16 @@ def _creeping(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
     if system is None or not ways:
         return
     v = run.v[-1] + PART * plain.draw.normal(size=run.v.shape[1])
-    rates = system.gap(run.q[-1], v)[1] - np.asarray(system.drift, dtype=np.float64)
+    rates = _rates(system, run.q[-1], v)
     fastest = max(float(np.linalg.norm(rates[way])) for way in ways)
     moving = replace(run, v=np.concatenate([run.v[:-1], [v]]))
     yield Control(fault="what holds moves", run=moving, plain=run, sees={"creep_speed": exactly(fastest)})
+
+
+def _rates(system: System, q: Floats, v: Floats) -> Floats:
+    """Return the rates of all rows (nc,) against what their surfaces do by themselves."""
+    rates: Floats = system.gap(q, v)[1] - np.asarray(system.drift, dtype=np.float64)
+    return rates
 
 
 def _bounds(case: Case, run: Trajectory) -> tuple[NDArray[np.intp], list[slice], Floats]:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from crossbody.cases import Case
 from crossbody.reports.judging.stored import SAME_END, compared_until
 from crossbody.reports.judging.verdict import Regression, Verdict, Word
 from crossbody.reports.measuring.truth import TRUTH, Truth, shortened
-
-if TYPE_CHECKING:
-    pass
 
 
 def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:

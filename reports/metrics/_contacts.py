@@ -116,10 +116,10 @@ def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None
 
     Number of samples and rows at which an open row pushes, a FREE one is below its surface by more than the longest way
     between samples though the run has BALLISTIC ones (engines without call any FREE that does not push), or a closed
-    one is above by as much and bears nothing; at which friction is called SLIP below half
-    its bound, STICK beyond one and a half times it (pyramids in and around a cone of friction are within the root of
-    two), or STICK at its bound while it slips. Samples beside events are left out: a step has the force of either side.
-    It asks nothing of the truth or the law. None without rows and where modes are not known, NaN where lam is not.
+    one is above by as much and bears nothing; at which friction is called SLIP below half its bound, STICK beyond one
+    and a half times it (pyramids in and around a cone of friction are within the root of two), or STICK at its bound
+    while it slips. Samples beside events are left out: a step has the force of either side. It asks nothing of the
+    truth or the law. None without rows and where modes are not known, NaN where lam is not.
     """
     if not run.mode.size or (run.mode < 0).any() or len(run.t) < 2:
         return None
