@@ -80,11 +80,14 @@ def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
 
 @compiled
 def _comes_near_zero(s: Any, m: Model, w: Work, i: int) -> bool:
-    """Whether the slip of contact i loses more than half of what it is within the step: it may pass zero beside it."""
-    before, along = slip(m, w, i, w.rates[0]), 0.0
+    """Whether the slip of contact i loses more than half of what it is within the step, or turns by more than 60 deg.
+
+    It may pass zero beside it.
+    """
+    before, after, along = slip(m, w, i, w.rates[0]), slip(m, w, i, w.rates[NODES - 1]), 0.0
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
         along += (w.rates[0, t] - m.drift[t] - w.rest[t]) * (w.rates[NODES - 1, t] - m.drift[t] - w.rest[t])
-    return bool(before > small_slip(s) and along < 0.5 * before * before)
+    return bool(before > small_slip(s) and along < 0.5 * before * max(before, after))
 
 
 @compiled
