@@ -250,17 +250,37 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             s.theta = min(s.theta, w.hit[i])
     if s.theta <= 1.0:
         _tie(s, w)
-        if s.frictional and _turns_aside(K, s, m, w):
-            return TOO_LONG
+        if s.frictional:
+            _look_at(K, s, m, w, s.theta)
+            _stop_first(s, m, w, mode)
+            if ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0:
+                return TOO_LONG
     return 0
 
 
 @compiled
-def _turns_aside(K: Any, s: Any, m: Model, w: Work) -> bool:
-    """Whether what seems to be a stop at s.theta is a slip that has turned by a right angle."""
-    dense.state(s, m, w, s.theta, w.ys)
-    K.gaps(s.t_old + s.theta * s.hs, w.ys[: s.nq], w.ys[s.nq :], m.p, w.gap, w.rate)
-    return bool(ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0)
+def _look_at(K: Any, s: Any, m: Model, w: Work, theta: float) -> None:
+    """Leave in w.gap and w.rate those at the part theta of the step."""
+    dense.state(s, m, w, theta, w.ys)
+    K.gaps(s.t_old + theta * s.hs, w.ys[: s.nq], w.ys[s.nq :], m.p, w.gap, w.rate)
+
+
+@compiled
+def _stop_first(s: Any, m: Model, w: Work, mode: Bytes) -> None:
+    """Let contacts without a direction stop at s.theta in place of what lets go or breaks loose there.
+
+    As their slips turn through zero forces jump, for a time that is none: what follows from that no motion does. Which
+    contacts go on is decided for all of them together, as at any stop.
+    """
+    loose, stopped = False, False
+    for i in range(s.nc):
+        loose = loose or (w.hit[i] <= s.theta and w.kind[i] in (CONE, RELEASE))
+    for i in range(s.nc if loose else 0):
+        if m.tangents[i] > 1 and stops_too(s, m, w, mode, i):
+            w.hit[i], w.kind[i], stopped = s.theta, STOP, True
+    for i in range(s.nc if stopped else 0):
+        if w.hit[i] <= s.theta and w.kind[i] in (CONE, RELEASE):
+            w.hit[i] = NEVER
 
 
 @compiled

@@ -111,7 +111,7 @@ def slip_along(m: Model, w: Work, i: int, rate: Array) -> float:
 
 @compiled
 def has_begun(w: Work, i: int) -> bool:
-    """Whether the slip of contact i counts from the velocity with which it has begun."""
+    """Whether the slip of contact i has just begun: it is no faster than what is not known of where it did."""
     return bool(w.since[i] > -np.inf)
 
 
@@ -139,8 +139,7 @@ def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
                 w.law[t, 0], w.law[t, 1], w.law[t, 2] = 0.0, 0.0, 0.0
         else:
             w.within[i], w.course[i] = np.inf, np.inf
-            if has_begun(w, i):
-                count_from_none(m, w, i)
+            count_from_none(m, w, i)
 
 
 @compiled

@@ -331,7 +331,7 @@ class Work:
     slip: Floats  # (n,) scratch
     # Where contacts have friction, and empty elsewhere:
     way: Floats  # (nc,) by tangential row: direction of slip of reference
-    rest: Floats  # (nc,) slip velocity with which one began that counted as none
+    rest: Floats  # (nc,) slip velocity with which one began that counted as none, until it is far faster
     kept_way: Floats
     kept_other: Floats
     kept_excess: Floats
@@ -346,7 +346,7 @@ class Work:
     wants: Bytes  # mode that each contact would rather have
     sets: Bytes2  # (64, nc) sets that were tried
     begins: Bytes  # contacts that have reached their bounds at this instant
-    since: Floats  # (nc,) instant since which a slip counts from w.rest; -inf for one that counts from none
+    since: Floats  # (nc,) instant since which a slip has just begun, at w.rest; -inf for one like any other
     cones: Floats2  # (5, nc) at the nodes of the step: how far a contact is from sliding, or one that slides from a jam
     bare: Floats  # (nc,) right-hand sides without what pulls sticking rows back
     excess: Floats  # (nc,) by how much faster than its law each row moves

@@ -22,7 +22,8 @@ from crossbody.reference.core.guards import STOP
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
-CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip counts from none
+CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip is known as well as any other
+FORGETS = 300.0  # times as much as it began with: then it counts from none, which turns it by 3e-3 rad at most
 LINGERS = 10.0  # times as long as friction takes to stop what has no direction: what slides so slowly is held
 
 
@@ -133,6 +134,18 @@ def _lingers(s: Any, m: Model, w: Work, i: int, rate: Array) -> bool:
 
 
 @compiled
+def _forget(s: Any, m: Model, w: Work, i: int, size: float) -> None:
+    """Let a slip of that size, which has begun, be one like any other, and at last forget with what it began.
+
+    To forget it early would turn the friction of contact i at once, and break others loose that are near their bounds.
+    """
+    if has_begun(w, i) and size > CLEAR * max(small_slip(s), _rest(m, w, i)):
+        w.since[i], s.watched = -np.inf, 0
+    if not has_begun(w, i) and (m.tangents[i] == 1 or size > FORGETS * _rest(m, w, i)):
+        count_from_none(m, w, i)
+
+
+@compiled
 def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
     """Take the directions of the present slip velocities for those of reference, where they are clear of zero.
 
@@ -142,9 +155,7 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
     linger = False
     for i in range(s.nc):
         if has_friction(m, i) and w.slides[i]:
-            if has_begun(w, i) and slip(m, w, i, rate) > CLEAR * max(small_slip(s), _rest(m, w, i)):
-                count_from_none(m, w, i)
-                s.watched = 0
+            _forget(s, m, w, i, slip(m, w, i, rate))
             if slip(m, w, i, rate) > small_slip(s):
                 face(m, w, i, rate)
             if m.tangents[i] > 1:
