@@ -208,8 +208,10 @@ class Slipping:
             size = max(size, 0.0 if self.system.dry[i] else float(self.system.friction[i]) * self._load())
         elif e.before is Mode.SLIP and e.after in (Mode.STICK, Mode.SLIP):
             slip, size = slips(here, here.q, here.v, i), self.speed
-            value, gradient = float(np.linalg.norm(slip)), self._way(i, k) @ slip_gradient(here, self.over, i)
-            if value <= NONE * size and e.after is Mode.SLIP and len(slip) > 1:
+            all_ways, n = slip_gradient(here, self.over, i), self.system.n
+            value, gradient = float(np.linalg.norm(slip)), self._way(i, k) @ all_ways
+            in_space = np.linalg.matrix_rank(all_ways[:, n : 2 * n]) > 1
+            if value <= NONE * size and e.after is Mode.SLIP and in_space:
                 raise SceneError(TURNS_BACK.format(i=i, t=e.t))
         elif e.before in ACTIVE:
             lam = slopes(here, self.over)[1]
