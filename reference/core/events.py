@@ -69,6 +69,7 @@ from crossbody.reference.core.machine import active_mode, known, off_law, releas
 from crossbody.reference.core.search import first_below, opens
 from crossbody.reference.kinds import Bytes
 
+EARLY = 0.5  # part of a step before which a gap that opens again has been below zero for too few of its places
 PULLS = 1e-6  # part of the largest force by which a contact pulls that is no rounding of where it lets go
 
 
@@ -250,12 +251,28 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             s.theta = min(s.theta, w.hit[i])
     if s.theta <= 1.0:
         _tie(s, w)
+        if _leaves_early(s, w, mode):
+            return TOO_LONG
         if s.frictional:
             _look_at(K, s, m, w, s.theta)
             _stop_first(s, m, w, mode)
             if ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0:
                 return TOO_LONG
     return 0
+
+
+@compiled
+def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
+    """Whether a gap that nothing presses shut passes below the surface, and out again, in a small part of the step.
+
+    Free flight may be one step of any length: in one so long its places show nothing of when the contact presses.
+    """
+    if s.method == EXACT or s.theta >= EARLY:
+        return False
+    for i in range(s.nc):
+        if w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC:
+            return True
+    return False
 
 
 @compiled
