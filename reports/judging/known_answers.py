@@ -31,18 +31,27 @@ MADE = ((*UNLIKE, 1), (*HELD, 3), (("m",), (True,), 4))
 
 @cache
 def wrong() -> tuple[tuple[str, float, Range, str], ...]:
-    """Return metric, number, least and most, and motion, of what metrics say of made-up motions and must not."""
-    made = [MadeUp(case_of(units, opens, seed), seed) for units, opens, seed in MADE]
-    return tuple(found for one in made for found in _wrong(one))
+    """Return metric, number, least and most, and motion, of what metrics say of made-up motions and must not.
+
+    Each is asked of the first motion that has a number of it, and of those before.
+    """
+    told: set[str] = set()
+    found: list[tuple[str, float, Range, str]] = []
+    for units, opens, seed in MADE:
+        made = MadeUp(case_of(units, opens, seed), seed)
+        wanted = {name: value for name, value in answers(made).items() if name not in told}
+        found += _wrong(made, wanted)
+        told |= {name for name, value in wanted.items() if value is not None}
+    return tuple(found)
 
 
-def _wrong(made: MadeUp) -> Iterator[tuple[str, float, Range, str]]:
-    for name, wanted in answers(made).items():
+def _wrong(made: MadeUp, wanted: Answers) -> Iterator[tuple[str, float, Range, str]]:
+    for name, value in wanted.items():
         found = _found(made, name)
-        if wanted is None and found is not None:
+        if value is None and found is not None:
             yield name, found, (np.nan, np.nan), "a number of a motion that has none"
-        elif wanted is not None and not (found is not None and abs(found - wanted) <= EXACT * abs(wanted)):
-            yield name, np.nan if found is None else found, (wanted, wanted), "a made-up motion"
+        elif value is not None and not (found is not None and abs(found - value) <= EXACT * abs(value)):
+            yield name, np.nan if found is None else found, (value, value), "a made-up motion"
 
 
 def _found(made: MadeUp, name: str) -> float | None:

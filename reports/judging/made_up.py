@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Law
 from crossbody.reports.measuring.truth import Truth
 
-SAMPLES, CONTACTS = 40, 4
+SAMPLES, CONTACTS = 30, 4
 HAIR, NEAR = 1e-4, 1e-5
 """Part of their instants that samples are before events; and of its errors that a run begins with that stays near."""
 NAMES = ("q", "v", "gap", "lam", "energy")
