@@ -209,7 +209,7 @@ def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
     assert entry.run is not None
     about = _about(case, entry.engine, entry.profile) | {"settings": dict(entry.settings)}
     about["took_s"] = entry.took_s
-    about["steps"] = _steps(entry.run.t if entry.stepped is None else entry.stepped)
+    about["steps"] = _steps((entry.run if entry.clock is None else entry.clock.run).t)
     return Trace(about=about, run=entry.run, truth=_beside(truth, entry.run))
 
 
