@@ -97,8 +97,7 @@ class MadeUp:
         made = {name: self._waves(t, width) for name, width in shapes.items()}
         for at in case.quaternions:
             made["q"][:, at : at + 4] /= np.linalg.norm(made["q"][:, at : at + 4], axis=1, keepdims=True)
-        if self.scalar:
-            made["gap"] = made["q"]
+        made["gap"] = made["q"] if self.scalar else self._apart(made["gap"])
         mode = random.choice([Mode.FREE, Mode.CONTACT], (len(t), rows)).astype(np.int8)
         pulls, acts = random.uniform(0.05, 0.5, 2)
         made["lam"] *= 300.0 * np.where(made["lam"] < 0.0, pulls, 1.0) * np.where(mode == Mode.FREE, acts, 1.0)
@@ -123,6 +122,12 @@ class MadeUp:
             if k % 2:
                 at, impulse = release + 1e-3 * t_end, float(random.uniform(1.0, 50.0))
                 found.append(Event(t=at, contact=row, before=Mode.FREE, after=Mode.FREE, impulse=impulse))
+        return found
+
+    def _apart(self, gap: Floats) -> Floats:
+        """Return gaps (n, nc) of which those of rows that open are the highest, and those of others the deepest."""
+        even = gap / np.abs(gap).max(axis=0, initial=1e-300) * self.random.uniform(0.5, 1.5, gap.shape[1])
+        found: Floats = np.where(self.case.law.unilateral, np.where(even > 0.0, 12.0 * even, even), 4.0 * even)
         return found
 
     def _waves(self, t: Floats, width: int) -> Floats:

@@ -18,6 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from crossbody.cases import Case, Ledger, Trajectory
+from crossbody.cases.arrays import Floats
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.measuring.truth import TRUTH
@@ -139,10 +140,21 @@ def _audits(found: Sequence[Mapping[str, Any]], result: CaseResult) -> Iterator[
 def _named(about: Mapping[str, Any], entry: Entry | None, case: Case) -> Iterator[str]:
     """Yield what differs of what is said of a motion; `entry` is None for the truth."""
     said: dict[str, object] = {"case": case.name, "variant": case.variant, "engine": TRUTH, "profile": ""}
-    if entry is not None:
+    if entry is not None and entry.run is not None:
         said |= {"engine": entry.engine, "profile": entry.profile, "took_s": entry.took_s}
         yield from (name for name in entry.settings if name not in about["settings"])
+        yield from _steps(about["steps"], entry.clock.run.t if entry.clock else entry.run.t)
     yield from (name for name, value in said.items() if about[name] != value)
+
+
+def _steps(found: Sequence[Sequence[float]], t: Floats) -> Iterator[str]:
+    """Yield whether starts and lengths of steps are none of those between instants (n,)."""
+    ends = np.unique(t)
+    starts, lengths = np.array(found[0]), np.array(found[1])
+    at = np.searchsorted(ends[:-1], starts)
+    there = at.max(initial=-1) < len(ends) - 1
+    if not (there and _equal(ends[at], starts) and _equal(np.diff(ends)[at], lengths)):
+        yield "its steps"
 
 
 def _read(found: Trace, run: Trajectory, trace: Trace) -> Iterator[str]:
