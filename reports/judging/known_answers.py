@@ -213,9 +213,10 @@ def _instants(made: MadeUp) -> Answers:
     known = [k for k, t in enumerate(touches) if t <= made.truth.trusted]
     shifts = [abs(float(late(t)) - t) for k in known for t in (touches[k], ends[k])]
     handed = [abs(float(late(settles[k])) - settles[k]) for k in known]
-    for k in known:  # by the way of the gap until it is free, at its fastest
-        gap, t = exact.gap[:, rows[k]], made.t
-        way = abs(float(np.interp(late(ends[k]), t, gap)) - float(np.interp(ends[k], t, gap)))
+    for k in known:  # by the way of the gap until it is free, with a blow behind, at its fastest
+        gap, t, until = exact.gap[:, rows[k]], made.t, [*touches, np.inf][k + 1]
+        free = max(e.t for e in exact.events if e.contact == rows[k] and e.after == Mode.FREE and e.t < until)
+        way = abs(float(np.interp(late(free), t, gap)) - float(np.interp(free, t, gap)))
         handed.append(way / max(abs(b - a) / d for a, b, d in zip(gap[:-1], gap[1:], np.diff(t), strict=True)))
     lasts = [e.t for e in run.events if _ends(e)]
     exits = [e.t for e in run.events if e.after == Mode.FREE]
