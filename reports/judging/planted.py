@@ -482,6 +482,7 @@ def friction(plain: Plain) -> Iterator[Control]:
     """Let what slides exceed its bound at one sample, and turn it."""
     rows, ways, bound = _bounds(plain.case, plain.run)
     most = float(np.max(bound, initial=0.0))
+    yield from _cumulated(plain, ways)
     yield from _creeping(
         plain, [way for row, way in zip(rows, ways, strict=True) if plain.run.mode[-1, row] == Mode.STICK]
     )
@@ -492,6 +493,23 @@ def friction(plain: Plain) -> Iterator[Control]:
         for i in plain.samples(among & lower if (among & lower)[plain.quiet].any() else among)[:1]:
             yield from _rubbed(plain, i, k)
             return
+
+
+def _cumulated(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
+    """Draw a force along a tangent at every one of few samples, far apart: its impulse and work by trapezoids."""
+    system, run = equations(plain.case), taken(plain.run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
+    if system is None or not ways or not run.lam.any():
+        return
+    row = ways[int(plain.draw.integers(len(ways)))].start
+    force = float(np.max(np.abs(run.lam))) * plain.draw.uniform(-1.0, 1.0, len(run.t))
+    slip = np.array([_rates(system, q, v)[row] for q, v in zip(run.q, run.v, strict=True)])
+    sees = {}
+    for name, power in (("friction_impulse", force), ("friction_work", force * slip)):
+        sums = np.append(0.0, np.cumsum([0.5 * (run.t[i + 1] - run.t[i]) * (power[i] + power[i + 1])
+                                         for i in range(len(run.t) - 1)]))  # fmt: skip
+        sees[name] = exactly(float(np.max(np.abs(sums))))
+    pushed = _with(run, "lam", (slice(None), row), run.lam[:, row] + force)
+    yield Control(fault=f"forces along row {row}", run=pushed, plain=run, sees=sees, wrong=False)
 
 
 def _creeping(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:

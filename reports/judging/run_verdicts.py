@@ -16,6 +16,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
+from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
 from crossbody.reports.judging.stored import Deviations, changed, defaults, deviations, differing, lacking, words
 from crossbody.reports.judging.verdict import (
@@ -73,8 +74,8 @@ class Entry:
         skipped: why, in one sentence.
         audit: what reached the engine beside the reference.
         study: runs of the same engine with other steps or tolerances, which tell the parts of its error.
-        stepped: ends of the run's own steps, s, where `run` was asked for other instants; None
-            where they are its own.
+        clock: the run of the engine's own steps, where `run` was asked for other instants, and what passed
+            around it; None where nobody looked.
         own: truth of the equations that the engine really integrates; None where they are the case's own.
         hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
         crashed: what it threw, where it did not come back with an outcome.
@@ -90,7 +91,7 @@ class Entry:
     skipped: str = ""
     audit: tuple[AuditRow, ...] = ()
     study: Study | None = None
-    stepped: Floats | None = None
+    clock: Clock | None = None
     own: Truth | None = None
     hidden: Mapping[str, str] = field(default_factory=dict)
     crashed: str = ""
@@ -237,6 +238,8 @@ def verdicts(
     if entry.run is None:
         return [judge_.row("run", math.nan, "", Word.SKIPPED, entry.skipped)]
     rows = [finished(judge_, entry.run), *_defaults(judge_)]
+    for value, why in () if entry.clock is None else mistimed(entry.clock, entry.run, entry.took_s):
+        rows.append(judge_.row("time (control)", value, "s", Word.OUTSIDE, why, tier=""))
     if entry.audit:
         rows.append(audited(judge_))
         if rows[-1].verdict == Word.OUTSIDE:

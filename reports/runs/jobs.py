@@ -17,6 +17,7 @@ from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
 from crossbody.reports.judging.audit import AuditRow, audit
+from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.comparison import check_names, judges_parts
 from crossbody.reports.judging.covered import covered
 from crossbody.reports.judging.first_steps import first_steps
@@ -182,8 +183,10 @@ def _ran(
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     own = {name: value for name, value in asked.items() if name in prepared.settings}
     rows += first_steps(case, (engines.load(pick.engine), prepared.profile), prepared.settings, own, rows, reference)
-    began = process_time()
-    natural = _of_case(case, pick, prepared.run())
+    began, clock, compiled = process_time(), perf_counter(), count.seconds
+    made = prepared.run()
+    around = perf_counter() - clock
+    natural = _of_case(case, pick, made)
     if bounded and natural.outcome is Outcome.TIME_LIMIT:
         raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
@@ -195,7 +198,7 @@ def _ran(
         settings=prepared.settings,
         default=not any(name in prepared.settings for name in asked),
         run=run,
-        stepped=natural.t,
+        clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled),
         audit=rows,
         study=_study(case, pick, prepared, natural, run, took, OF_STUDIES * budget) if studied else None,
         hidden=hidden,

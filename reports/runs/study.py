@@ -24,7 +24,7 @@ from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import TRUTH, Truth
 from crossbody.reports.metrics.position import gap_scale_of, scale_of
-from crossbody.reports.runs import files, watch
+from crossbody.reports.runs import files, read_back, watch
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, as_plain, save
 from crossbody.reports.runs.thin import keep
@@ -86,7 +86,9 @@ def write_case(made: Path, result: CaseResult, command: str) -> list[Row]:
     judged = judge([result], {result.case.label: command})
     told = {"verdicts": judged, "audit": _audit([result])}
     (made / CASE).write_text(json.dumps(told, default=as_plain), encoding="utf-8")
-    _save_traces(made, traces(result))
+    motions = traces(result)
+    _save_traces(made, motions)
+    read_back.check_case(made, result, judged, motions)
     return judged
 
 
@@ -100,6 +102,7 @@ def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) ->
     for i, trace in enumerate(traces):
         name = f"{trace.parent.name}/{trace.name}"
         (out / "traces" / f"{i:04d}.parquet").write_bytes(files.read_inside(trace.parent.parent, name))
+    read_back.check_tables(out, parts, rows)
     return rows
 
 
@@ -206,7 +209,7 @@ def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
     assert entry.run is not None
     about = _about(case, entry.engine, entry.profile) | {"settings": dict(entry.settings)}
     about["took_s"] = entry.took_s
-    about["steps"] = _steps(entry.run.t if entry.stepped is None else entry.stepped)
+    about["steps"] = _steps((entry.run if entry.clock is None else entry.clock.run).t)
     return Trace(about=about, run=entry.run, truth=_beside(truth, entry.run))
 
 

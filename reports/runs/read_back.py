@@ -1,0 +1,194 @@
+"""What is on disk is what was judged: a run reads its own tables and motions back, column by column.
+
+What differs is a failure of crossbody itself, since a table that is not what was judged says nothing of any engine.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from crossbody.cases import Case, Ledger, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.reports.judging.run_verdicts import Entry
+from crossbody.reports.judging.verdict import Row
+from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.runs.jobs import CaseResult
+from crossbody.reports.runs.store import Trace, load
+
+SIGNALS = ("q", "v", "gap", "lam", "energy", "mode")
+SAME = 1e-9
+"""Part of an error by which it may be another one."""
+NOT_KEPT = ("switches", "inputs", "sol", "determined_until", "unique_until")
+"""Of a motion, what pages and later comparisons do not ask for."""
+
+
+def check_case(made: Path, result: CaseResult, judged: Sequence[Row], traces: Sequence[Trace]) -> None:
+    """Check the folder of one case against what was judged.
+
+    Args:
+        made: the folder.
+        result: the runs.
+        judged: their verdicts.
+        traces: their motions, with the truth beside them.
+
+    Raises:
+        RuntimeError: naming what differs.
+    """
+    told = json.loads((made / "case.json").read_text(encoding="utf-8"))
+    _expect(result.case.label, [*_rows(told["verdicts"], judged, "verdict"), *_audits(told["audit"], result)])
+    entries = [None, *(one for one in result.entries if one.run is not None)]
+    paths = sorted((made / "traces").iterdir())
+    if not len(paths) == len(entries) == len(traces):
+        _expect(result.case.label, [f"{len(entries)} motions are {len(paths)} files"])
+    found = [load(path) for path in paths]
+    for one, trace, entry in zip(found, traces, entries, strict=True):
+        run = result.truth.trajectory if entry is None or entry.run is None else entry.run
+        differing = [*_named(one.about, entry, result.case), *_read(one, run, trace)]
+        if entry is not None and not result.case.quaternions:
+            who = (entry.engine, entry.profile, "position")
+            error = [row["value"] for row in judged if (row["engine"], row["profile"], row["metric"]) == who]
+            differing += [text for value in error for text in _error(one, found[0], result, value)]
+        _expect(f"{result.case.label} {TRUTH if entry is None else entry.engine}", differing)
+
+
+def check_tables(out: Path, parts: Sequence[Path], rows: Sequence[Row]) -> None:
+    """Check the tables and motions of a study against those of its cases.
+
+    Args:
+        out: folder of the study.
+        parts: folders of its cases, in order.
+        rows: its verdicts.
+
+    Raises:
+        RuntimeError: naming what differs.
+    """
+    told = [json.loads((part / "case.json").read_text(encoding="utf-8")) for part in parts]
+    audited = [row for one in told for row in one["audit"]]
+    _expect("the study", _rows([row for one in told for row in one["verdicts"]], rows, "verdict"))
+    for name, wanted in (("verdicts", rows), ("audit", audited)):
+        for found in _tables(out / name):
+            _expect(name, _rows(found, wanted, "row"))
+    traces = [path.read_bytes() for part in parts for path in sorted((part / "traces").iterdir())]
+    if traces != [path.read_bytes() for path in sorted((out / "traces").iterdir())]:
+        _expect("the study", ["its motions are not those of its cases"])
+
+
+def _expect(where: str, differing: Sequence[str] | Iterator[str]) -> None:
+    if (first := next(iter(differing), None)) is not None:
+        raise RuntimeError(f"What is stored of {where} is not what was judged: {first}.")
+
+
+def _tables(stem: Path) -> Iterator[Sequence[Mapping[str, Any]]]:
+    """Yield the rows of a table as JSON, CSV and Parquet have them."""
+    yield json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))["rows"]
+    with stem.with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        yield list(csv.DictReader(file))
+    yield _parquet(stem.with_suffix(".parquet")).to_pylist()
+
+
+def _parquet(path: Path) -> pa.Table:
+    """Return a table, without what `pq.read_table` imports for folders of them."""
+    with path.open("rb") as file:
+        return pq.ParquetFile(file, pre_buffer=False).read(use_threads=False)
+
+
+def _rows(found: Sequence[Mapping[str, Any]], wanted: Sequence[Row], what: str) -> Iterator[str]:
+    """Yield what differs of rows that must be the same in every column."""
+    if len(found) != len(wanted):
+        yield f"{len(wanted)} rows are {len(found)}"
+    for i, (one, other) in enumerate(zip(found, wanted, strict=False)):
+        for name, value in other.items():
+            if not _same(one.get(name, ...), value):
+                yield f"{name} of {what} {i} is {one.get(name)!r}, not {value!r}"
+
+
+def _same(found: Any, wanted: Any) -> bool:
+    """Whether a cell says a value: no number is none or empty, and a text is that of a value."""
+    if isinstance(wanted, float) and not isinstance(found, float):
+        if found is None or found == "":
+            return not math.isfinite(wanted)
+        return isinstance(found, (int, str)) and _same(float(found), wanted)
+    if isinstance(wanted, float):
+        return bool(found == wanted or (math.isnan(found) and math.isnan(wanted)))
+    if isinstance(found, str) and not isinstance(wanted, str):
+        return found.lower() == str(wanted).lower()
+    return bool(found == wanted or (found is None and wanted == ""))
+
+
+def _audits(found: Sequence[Mapping[str, Any]], result: CaseResult) -> Iterator[str]:
+    """Yield what differs of audits."""
+    wanted = [
+        dict(
+            case=result.case.label, engine=entry.engine, profile=entry.profile, quantity=row.quantity, value=row.mine,
+            reference=row.theirs, difference=float(row.difference), tolerance=row.tolerance, same=bool(row.ok),
+        )
+        for entry in result.entries for row in entry.audit
+    ]  # fmt: skip
+    yield from _rows(found, wanted, "audit")
+
+
+def _named(about: Mapping[str, Any], entry: Entry | None, case: Case) -> Iterator[str]:
+    """Yield what differs of what is said of a motion; `entry` is None for the truth."""
+    said: dict[str, object] = {"case": case.name, "variant": case.variant, "engine": TRUTH, "profile": ""}
+    if entry is not None and entry.run is not None:
+        said |= {"engine": entry.engine, "profile": entry.profile, "took_s": entry.took_s}
+        yield from (name for name in entry.settings if name not in about["settings"])
+        yield from _steps(about["steps"], entry.clock.run.t if entry.clock else entry.run.t)
+    yield from (name for name, value in said.items() if about[name] != value)
+
+
+def _steps(found: Sequence[Sequence[float]], t: Floats) -> Iterator[str]:
+    """Yield whether starts and lengths of steps are none of those between instants (n,)."""
+    ends = np.unique(t)
+    starts, lengths = np.array(found[0]), np.array(found[1])
+    at = np.searchsorted(ends[:-1], starts)
+    there = at.max(initial=-1) < len(ends) - 1
+    if not (there and _equal(ends[at], starts) and _equal(np.diff(ends)[at], lengths)):
+        yield "its steps"
+
+
+def _read(found: Trace, run: Trajectory, trace: Trace) -> Iterator[str]:
+    """Yield what differs of a motion as pages read it, and of the truth beside it."""
+    for field in fields(Trajectory):
+        if field.name not in NOT_KEPT and not _equal(getattr(found.run, field.name), getattr(run, field.name)):
+            yield f"{field.name}, as it is read"
+    if (found.truth is None) != (trace.truth is None):
+        yield "the truth beside it"
+    if found.truth is None or trace.truth is None:
+        return
+    for name in SIGNALS:
+        if not _equal(getattr(found.truth, name), getattr(trace.truth, name)):
+            yield f"{name} of the truth beside it"
+
+
+def _error(found: Trace, first: Trace, result: CaseResult, judged: float) -> Iterator[str]:
+    """Yield what its position and the truth's beside it are apart, where that is not what was judged.
+
+    Of a truth that is trusted to its end: else less is judged than is stored.
+    """
+    if found.truth is None or result.truth.trusted < result.truth.trajectory.t[-1]:
+        return
+    off = np.nanmax(np.abs(found.run.q - found.truth.q), axis=0) / np.array(first.about["scales"])
+    if not abs(float(np.max(off)) - judged) <= SAME * judged:
+        yield f"its error of position, {np.max(off):g}, not {judged:g}"
+
+
+def _equal(found: Any, wanted: Any) -> bool:
+    """Whether two values, arrays or accounts are the same; no number is none."""
+    if isinstance(wanted, Ledger):
+        return isinstance(found, Ledger) and all(
+            _equal(getattr(found, field.name), getattr(wanted, field.name)) for field in fields(Ledger)
+        )
+    if isinstance(wanted, np.ndarray):
+        return np.array_equal(found, wanted, equal_nan=wanted.dtype.kind == "f")
+    return bool(found == wanted)

@@ -1,0 +1,94 @@
+"""Questions with known answers that every run asks: nothing is told of what is right, and what is wrong is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crossbody import cases, engines
+from crossbody.cases import Trajectory
+from crossbody.reports.judging import judge_controls, known_answers, known_parts, known_steps, known_tables, parts
+from crossbody.reports.judging.clocks import Clock, mistimed
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring.truth import shortened
+
+KNOWN = (known_answers, known_parts, known_steps, known_tables)
+
+
+@pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_what_is_right_is_not_told(module: Any) -> None:
+    assert module.wrong() == ()
+
+
+@pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_what_is_wrong_is_a_row_of_every_run(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "wrong", lambda: (("position", 1.0, (2.0, 2.0), "a motion"),))
+    case = cases.load("bouncing_ball", "elastic")
+    rows = judge_controls.blind(case, shortened(truth_of(case)), "")
+    assert [(row.metric, row.verdict) for row in rows] == [("position (control)", "outside")]
+
+
+PARTS: dict[str, Callable[[Any], Any]] = {
+    "extrapolated": lambda own: lambda errors, ratio: own(errors, ratio + 1.0),
+    "observed": lambda own: lambda errors, sizes: (2.0 * own(errors, sizes)[0], own(errors, sizes)[1]),
+    "remaining": lambda own: lambda errors: 2.0 * own(errors),
+    "_most": lambda own: lambda error: float(np.mean(np.abs(error))),
+    "scale_of": lambda own: lambda *given: 2.0 * own(*given),
+}
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_parts_that_are_others_are_told(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    change = PARTS[name]
+    monkeypatch.setattr(parts, name, change(getattr(parts, name)))
+    if name == "remaining":
+        monkeypatch.setattr(known_parts, name, parts.remaining)
+    known_parts.wrong.cache_clear()
+    try:
+        assert bool(known_parts.wrong()) == (name != "_most")  # by which is said to what parts are known alone
+    finally:
+        known_parts.wrong.cache_clear()
+
+
+def test_steps_that_err_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = known_steps._run
+
+    def off(*given: Any) -> Trajectory:
+        run = own(*given)
+        return replace(run, q=run.q * (1.0 + 1e-3), steps=3 * run.steps if given[3] < 1e-7 else run.steps)
+
+    monkeypatch.setattr(known_steps, "_run", off)
+    told = {name for name, *_ in known_steps._cubic()}
+    assert told == {
+        f"reference {name}{what}" for name in ("explicit", "implicit") for what in ("", " (steps)", " (work)")
+    }
+
+
+def test_tables_whose_coefficients_are_others_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    for k, (name, A, b, c, order) in enumerate(known_tables.METHODS):
+        for i, j in zip(*np.nonzero(A), strict=True):
+            other = A.copy()
+            other[i, j] *= 1.0 + 1e-10
+            changed = (*known_tables.METHODS[:k], (name, other, b, c, order), *known_tables.METHODS[k + 1 :])
+            monkeypatch.setattr(known_tables, "METHODS", changed)
+            assert any(abs(off) > known_tables.ROUNDED for _, off, _ in known_tables._orders())
+
+
+def test_times_that_are_no_run_s_are_told() -> None:
+    run = engines.load("reference").prepare(cases.load("bouncing_ball", "elastic"), "compiled").run()
+    run = replace(run, wall_s=1.0, steps=1000)
+    right = Clock(run=run, around_s=2.0, compiled_s=0.0)
+    assert list(mistimed(right, run, 3.0)) == []
+    for clock, shown, took in (
+        (right, replace(run, wall_s=1.1), 3.0), (right, replace(run, steps=1), 3.0), (right, run, 1.9),
+        (replace(right, around_s=0.9), run, 3.0), (replace(right, run=replace(run, wall_s=1e-5)), run, 3.0),
+        (replace(right, run=replace(run, control_s=1.1)), run, 3.0),
+        (Clock(run=replace(run, wall_s=1e-6), around_s=1e-6, compiled_s=0.0), replace(run, wall_s=1e-6), 3.0),
+    ):  # fmt: skip
+        assert list(mistimed(clock, shown, took))
+    unknown = replace(run, wall_s=0.0)  # one's own engine need not know it
+    assert list(mistimed(replace(right, run=unknown), unknown, 3.0)) == []
