@@ -16,6 +16,7 @@ from crossbody.reference.core.acceleration import OWN, accelerate, is_active, sc
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
 from crossbody.reference.core.friction import (
+    CLEAR,
     JAMS,
     NOTHING,
     TURNS_ASIDE,
@@ -254,9 +255,8 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
         if _leaves_early(s, w, mode):
             return TOO_LONG
         if s.frictional:
-            _look_at(K, s, m, w, s.theta)
-            _stop_first(s, m, w, mode)
-            if ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0:
+            _stop_first(K, s, m, w, mode)
+            if s.theta <= 1.0 and ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0:
                 return TOO_LONG
     return 0
 
@@ -283,21 +283,37 @@ def _look_at(K: Any, s: Any, m: Model, w: Work, theta: float) -> None:
 
 
 @compiled
-def _stop_first(s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """Let contacts without a direction stop at s.theta in place of what lets go or breaks loose there.
+def _dies_out(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether the slip of contact i falls at s.theta and is so small that its direction is none that is known."""
+    if not (m.tangents[i] > 1 and mode[i] == SLIP and has_friction(m, i)) or has_begun(w, i):
+        return False
+    size = slip(m, w, i, w.rate)
+    return bool(size <= CLEAR * small_slip(s) and size < slip(m, w, i, w.rates[0]))
 
-    As their slips turn through zero forces jump, for a time that is none: what follows from that no motion does. Which
+
+@compiled
+def _stop_first(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> None:
+    """Pass over what lets go or breaks loose where another slip dies out, without a direction; it stops if it can.
+
+    As a slip turns through zero forces jump, for a time that is none: what follows from that no motion does. Which
     contacts go on is decided for all of them together, as at any stop.
     """
-    loose, stopped = False, False
-    for i in range(s.nc):
-        loose = loose or (w.hit[i] <= s.theta and w.kind[i] in (CONE, RELEASE))
-    for i in range(s.nc if loose else 0):
-        if m.tangents[i] > 1 and stops_too(s, m, w, mode, i):
-            w.hit[i], w.kind[i], stopped = s.theta, STOP, True
-    for i in range(s.nc if stopped else 0):
-        if w.hit[i] <= s.theta and w.kind[i] in (CONE, RELEASE):
-            w.hit[i] = NEVER
+    doubted = True
+    while doubted and s.theta <= 1.0:
+        _look_at(K, s, m, w, s.theta)
+        doubted, first = False, NEVER
+        for i in range(s.nc):
+            if _dies_out(s, m, w, mode, i):
+                for k in range(s.nc):
+                    if k != i and w.hit[k] <= s.theta and w.kind[k] in (CONE, RELEASE):
+                        w.hit[k], doubted = NEVER, True
+                if doubted and stops_too(s, m, w, mode, i):
+                    w.hit[i], w.kind[i] = s.theta, STOP
+        for k in range(s.nc):
+            first = min(first, w.hit[k])
+        for k in range(s.ng):
+            first = min(first, w.guard_hit[k])
+        s.theta = first
 
 
 @compiled

@@ -18,6 +18,7 @@ from crossbody.reference.kinds import Array, Bytes
 
 SMALL_SLIP = 1e-9  # of the largest speed: a slip velocity below has no direction of its own,
 SMALL_SLIP_STEPS = 10.0  # or below so many times the relative tolerance
+CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip is known as well as any other
 DRIFT = 10.0  # times as much as has no direction, from which on a contact that sticks is known not to
 TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes may be off
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.friction import (
+    CLEAR,
     bound,
     count_from_none,
     has_begun,
@@ -22,7 +23,6 @@ from crossbody.reference.core.guards import STOP
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
-CLEAR = 10.0  # times as much as has no direction, or it began with: then a slip is known as well as any other
 FORGETS = 300.0  # times as much as it began with: then it counts from none, which turns it by 3e-3 rad at most
 LINGERS = 10.0  # times as long as friction takes to stop what has no direction: what slides so slowly is held
 

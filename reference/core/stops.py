@@ -9,12 +9,12 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.cones import within_bound
 from crossbody.reference.core.coulomb import factor_as_held, respond
-from crossbody.reference.core.friction import decided_to, has_begun, has_friction, is_dry, slip, small_slip
+from crossbody.reference.core.friction import CLEAR, decided_to, has_begun, has_friction, is_dry, slip, small_slip
 from crossbody.reference.core.guards import RELEASE, at_node
 from crossbody.reference.core.jams import determinant
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.core.mode_set import aside, exceed
-from crossbody.reference.core.slips import CLEAR, angle
+from crossbody.reference.core.slips import angle
 
 PARTS, HALVINGS = 48, 40  # of a full turn that are looked at, and between two of these
 
