@@ -16,7 +16,6 @@ from crossbody.reference.core.acceleration import OWN, accelerate, is_active, sc
 from crossbody.reference.core.algebra import ULP
 from crossbody.reference.core.flight import free_flight
 from crossbody.reference.core.friction import (
-    CLEAR,
     JAMS,
     NOTHING,
     TURNS_ASIDE,
@@ -68,6 +67,7 @@ from crossbody.reference.core.layout import (
 )
 from crossbody.reference.core.machine import active_mode, known, off_law, released_mode, slow
 from crossbody.reference.core.search import first_below, opens
+from crossbody.reference.core.slips import dies_out
 from crossbody.reference.kinds import Bytes
 
 EARLY = 0.5  # part of a step before which a gap that opens again has been below zero for too few of its places
@@ -271,7 +271,7 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
         return False
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC:
-            return True
+            return not (w.rates[0, i] >= 0.0 and opens(s, w, i, s.theta))
     return False
 
 
@@ -283,17 +283,8 @@ def _look_at(K: Any, s: Any, m: Model, w: Work, theta: float) -> None:
 
 
 @compiled
-def _dies_out(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
-    """Whether the slip of contact i falls at s.theta and is so small that its direction is none that is known."""
-    if not (m.tangents[i] > 1 and mode[i] == SLIP and has_friction(m, i)) or has_begun(w, i):
-        return False
-    size = slip(m, w, i, w.rate)
-    return bool(size <= CLEAR * small_slip(s) and size < slip(m, w, i, w.rates[0]))
-
-
-@compiled
 def _stop_first(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """Pass over what lets go or breaks loose where another slip dies out, without a direction; it stops if it can.
+    """Pass over what lets go or breaks loose where another slip turns as it dies out; that one stops if it can.
 
     As a slip turns through zero forces jump, for a time that is none: what follows from that no motion does. Which
     contacts go on is decided for all of them together, as at any stop.
@@ -303,7 +294,7 @@ def _stop_first(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> None:
         _look_at(K, s, m, w, s.theta)
         doubted, first = False, NEVER
         for i in range(s.nc):
-            if _dies_out(s, m, w, mode, i):
+            if m.tangents[i] > 1 and mode[i] == SLIP and dies_out(s, m, w, i):
                 for k in range(s.nc):
                     if k != i and w.hit[k] <= s.theta and w.kind[k] in (CONE, RELEASE):
                         w.hit[k], doubted = NEVER, True

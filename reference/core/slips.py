@@ -24,6 +24,8 @@ from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
 FORGETS = 300.0  # times as much as it began with: then it counts from none, which turns it by 3e-3 rad at most
+NEAR = 2.0  # times as much as has no direction: what a step may be off turns so slow a slip as well
+TURNED = 1e-4  # less than one, of the cosine between where a slip that dies out was last clear of zero and where it is
 LINGERS = 10.0  # times as long as friction takes to stop what has no direction: what slides so slowly is held
 
 
@@ -107,6 +109,14 @@ def turns_aside(s: Any, m: Model, w: Work) -> bool:
         elif m.tangents[i] > 1 and w.slides[i] and _comes_near_zero(s, m, w, i):
             return True
     return False
+
+
+@compiled
+def dies_out(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether the slip of contact i falls in the step, and has turned where it has no direction that is known."""
+    size = slip(m, w, i, w.rate)
+    falls = size <= NEAR * small_slip(s) and size < slip(m, w, i, w.rates[0]) and not has_begun(w, i)
+    return bool(falls and w.course[i] < np.inf and np.cos(angle(m, w, i, w.rate) - w.course[i]) < 1.0 - TURNED)
 
 
 @compiled
