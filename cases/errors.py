@@ -22,6 +22,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+import re
 from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
@@ -62,7 +63,7 @@ class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other
     """A name that nobody knows; the message lists those that exist.
 
     Args:
-        kind: what was named, for example "case".
+        kind: what was named, for example "case" or "variant of bouncing_ball".
         name: the name that was given.
         known: the names that exist.
     """
@@ -73,7 +74,9 @@ class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other
         close = difflib.get_close_matches(_stem(name), stems, n=1) if isinstance(name, str) else ()
         hint = f" Did you mean {stems[close[0]]!r}?" if close else ""
         others = f"Known: {', '.join(self.known)}." if self.known else "There are none."
-        super().__init__(f"There is no {kind} {shown(name)}.{hint} {others}")
+        what, *where = re.split(r"(?= of | in | \()", kind, maxsplit=1)
+        self.advice = f".{hint} {others}"
+        super().__init__(f"There is no {what} {shown(name)}{''.join(where)}{self.advice}")
 
 
 def _stem(name: str) -> str:
@@ -98,7 +101,7 @@ class NoFile(UnknownName):
             beside = sorted(one.name for one in found if suffix and one.name.endswith(suffix) and one.is_file())
             known = (*known, *beside[:LISTED])
         super().__init__(kind, name, known)
-        told = str(self).partition(f"{shown(name)}")[2]
+        told = self.advice
         if os.path.exists(text):
             told = ": it is a folder, a pipe or a device."
         elif folder and not os.path.isdir(folder):

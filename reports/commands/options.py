@@ -105,7 +105,7 @@ def settings_of(context: click.Context, _parameter: click.Parameter, begun: str)
     from crossbody import cases, engines
     from crossbody.reports.runs.choice import DEFAULT_ENGINES, parse_engine
 
-    found: dict[str, None] = {}
+    found: dict[str, str] = {}
     wanted = context.params.get("wanted") or [one for one in DEFAULT_ENGINES if one in engines.names()]
     for name, profile in map(parse_engine, wanted):
         if not (begun.startswith(f"{name}.") or name.startswith(begun)):
@@ -114,8 +114,8 @@ def settings_of(context: click.Context, _parameter: click.Parameter, begun: str)
             case, engine = cases.load((_given(context) or ["bouncing_ball"])[0]), engines.load(name)
             for each in (profile,) if profile else engine.profiles:
                 with suppress(cases.CaseUnsupported):
-                    found |= dict.fromkeys(f"{name}.{key}=" for key in engine.planned(case, each))
-    return [CompletionItem(name) for name in found if name.startswith(begun)]
+                    found |= {f"{name}.{key}=": one.doc for key, one in engine.offered(case, each).items()}
+    return [CompletionItem(name, help=doc) for name, doc in found.items() if name.startswith(begun)]
 
 
 class Whole(click.IntRange):

@@ -116,7 +116,7 @@ def test_a_synthetic_log_is_called_so_everywhere(tmp_path: Path, capsys: pytest.
     [
         (["-m", "triple_pendulum", "--columns", "multiarm_double"], "There is no model 'triple_pendulum'"),
         ([*MODEL, "-e", "bullet"], "There is no engine 'bullet'"),
-        ([*MODEL, "--set", "mass=1"], "There is no parameter of double_pendulum 'mass'"),
+        ([*MODEL, "--set", "mass=1"], "There is no parameter 'mass' of double_pendulum"),
         ([*MODEL, "--restart", "100"], "no window of 100 s"),
         ([*MODEL, "--closed-loop"], "has no controller"),
     ],

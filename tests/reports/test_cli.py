@@ -273,7 +273,7 @@ def test_a_setting_is_given_to_whom_it_names(given: tuple[str, ...], steps: Mapp
     ("setting", "words"),
     [
         ("fack.dt=1", "Did you mean 'fake'"), ("fake:exakt.dt=1", "Did you mean 'exact'"),
-        ("fake.dd=1", "no setting of fake 'dd'"),
+        ("fake.dd=1", "no setting 'dd' of fake"),
     ],
 )  # fmt: skip
 def test_a_setting_of_nobody_is_a_sentence(setting: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -296,6 +296,17 @@ def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.Cap
     assert "fake:off  dt=0.004" in said
     assert "absent:*  skipped: Engine 'absent' needs" in said
     assert list(Path.cwd().iterdir()) == []
+
+
+def test_a_dry_run_says_once_what_variants_share(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(FakeEngine, "planned", lambda *_, **settings: {"dt": 1e-3} | settings)
+    assert call("run", "bouncing_ball", "-e", "fake:exact", "-e", "fake:off", "--dry-run") == 0
+    said = capsys.readouterr().out
+    assert said.count("mass 1") == said.count("fake:exact  dt=0.001") == said.count("fake:off  ") == 1
+    assert "  parameters: a0 10000, a2 0; all others as for bouncing_ball:listing\n" in said
+    assert said.count("  all engines as for bouncing_ball:listing\n") == len(cases.variants("bouncing_ball")) - 1
 
 
 def test_a_plan_as_json_says_what_the_plan_says(capsys: pytest.CaptureFixture[str]) -> None:
