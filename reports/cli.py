@@ -108,9 +108,10 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     if dry:
         words = ("names", "wanted", "variant", "pairs", "rtol", "settings", "out", "against", "others", "limit")
         return _do("planned.tell", **{name: asked[name] for name in words})
-    from crossbody.reports.runs import choice  # wrong words are reported before all else is imported
+    from crossbody.reports.runs import choice, output  # wrong words are reported before all else is imported
 
     given = choice.parse_settings(asked["pairs"])
+    output.check(asked["out"], "run")
     cases = choice.load_cases(asked["names"], asked.pop("variant"), given, asked["limit"])
     return _do("run.run", cases, **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
 

@@ -51,6 +51,7 @@ THEME = (
 """Runs before anything is drawn, so that a page does not flash."""
 
 
+WRITTEN_OUT = 1e4  # from here on four digits would have an exponent, which they need from a million on
 UNITLESS = re.compile(r"(<br>|\s)*\[1\]$")  # what a number without a unit would have for one
 
 
@@ -264,4 +265,6 @@ def number(value: Any) -> str:
     """A number for a table: a count in full, any other with four digits, a dash where there is none."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
+    if isinstance(value, float) and WRITTEN_OUT <= abs(value) < 100.0 * WRITTEN_OUT:
+        return f"{float(f'{value:.4g}'):.0f}"
     return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)

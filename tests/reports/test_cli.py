@@ -287,6 +287,17 @@ def test_a_setting_that_an_engine_refuses_is_told_before_any_run(monkeypatch: py
     assert call(*LINEAR, "-e", "fake:exact", "--set-engine", "fake.dd=1") == 2
 
 
+def test_a_folder_of_others_is_refused_before_a_case_is_built(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Who compiles first waits for that sentence."""
+    Path("mine").mkdir()
+    Path("mine/notes.txt").write_text("mine")
+    monkeypatch.setattr(cases, "load", lambda *_, **__: pytest.fail("a case was built"))
+    assert call(*LINEAR, "--out", "mine") == 2
+    assert "holds files that crossbody did not write" in capsys.readouterr().err
+
+
 def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("-e", "fake", "-e", "absent", "--set", "t_end=2", "--set-engine", "fake:off.dt=4e-3", "--dry-run")
     assert call(*LINEAR, *words) == 0

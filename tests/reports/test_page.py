@@ -533,6 +533,22 @@ def test_a_page_needs_no_engine(out: Path) -> None:
     assert said.strip() == "[]"
 
 
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (36834.6, "36830"),
+        (-12345.0, "-12340"),
+        (1.5e6, "1.5e+06"),
+        (9999.0, "9999"),
+        (1e-5, "1e-05"),
+        (-0.0, "0"),
+        (7, "7"),
+    ],
+)
+def test_four_digits_have_an_exponent_where_they_need_one(value: float, said: str) -> None:
+    assert html.number(value) == said
+
+
 def test_a_page_of_given_sections() -> None:
     rows = [{"a": HOSTILE, "b": 1 / 3}, {"a": "x", "b": float("nan")}]
     given = Table(title="Numbers", columns=columns(a="A", b=("B [m]", Kind.NUMBER)), rows=rows)
