@@ -167,7 +167,9 @@ def run_identify(
             for shown in tables.values():
                 print_rows(shown, 6, heads=HEADS, left_out=SPARED)
                 click.echo()
-            click.echo(f"{layout.told(fit.sensitivities)}\n{layout.told(f'Intervals: {fit.covariance}')}")
+            click.echo(
+                f"{layout.told(f'Derivatives: {fit.sensitivities}')}\n{layout.told(f'Intervals: {fit.covariance}')}"
+            )
         for warning in fit.warnings:
             click.echo(layout.told(f"warning: {warning}"))
         _say_outside(rows)

@@ -24,7 +24,7 @@ from crossbody.reports.runs.store import Trace
 
 PLOTTED = 900_000  # room for all plots of a page, bytes; the samples of each line follow from it
 RUNS = columns(
-    who="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
+    called="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
     wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
     samples=("Samples stored", Kind.NUMBER),
     settings=("Settings", Kind.LONG),
@@ -148,8 +148,8 @@ def _run(trace: Trace) -> dict[str, Any]:
     run = trace.run
     settings = trace.about.get("settings", {})
     return {
-        "who": label(trace), "outcome": f"{run.outcome.value} {run.message}".strip(), "steps": run.steps,
-        "events": len(run.events), "wall_ms": 1e3 * run.wall_s if run.wall_s else None,
+        "who": label(trace), "called": called(trace), "outcome": f"{run.outcome.value} {run.message}".strip(),
+        "steps": run.steps, "events": len(run.events), "wall_ms": 1e3 * run.wall_s if run.wall_s else None,
         "control_ms": 1e3 * run.control_s if run.control_s else None, "samples": len(run.t),
         "settings": ", ".join(
             f"{k} = {v:.6g}" if isinstance(v, float) else f"{k} = {v}" for k, v in settings.items() if k != "samples"

@@ -44,6 +44,7 @@ SIGNS = {
 }  # fmt: skip
 """A verdict is shown by sign and word besides its colour."""
 MOST = 2000  # rows of a table that a page shows; the file beside it has all
+UNFOLDED = 500  # characters of a text in a table that are shown at once
 THEME = (
     'try { const kept = localStorage.getItem("crossbody-theme"); '
     "if (kept) document.documentElement.dataset.theme = kept; } catch { /* a browser may refuse storage to a file */ }"
@@ -173,7 +174,7 @@ def environment() -> Environment:
         "text_packed": packed_text,
         "value_packed": packed_value,
     }
-    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST}
+    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST, "UNFOLDED": UNFOLDED}
     return made
 
 

@@ -16,7 +16,7 @@ THROUGHPUT_TEXT = (
 ANALYSIS_TEXT = (
     "Linear models about the equilibria of the case, in the named modes, by exact derivatives of "
     "the equations. Rows that hold are eliminated, so that their law adds no poles, unless the law "
-    "itself is studied. Where a contact slides, nothing stands: the model is that of the equations "
+    "itself is studied. Where a contact slides, nothing is at rest, and the equations are linearised "
     "about the motion. A pole with a positive real part grows, one with a negative real part "
     "decays. Linear stability does not show that an equilibrium is reached. Engines are judged by "
     "their largest difference from the reference: in the derivatives of the accelerations, each "

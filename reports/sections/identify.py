@@ -19,7 +19,7 @@ ESTIMATES = columns(
     first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
 )  # fmt: skip
 HELD = columns(
-    error="Error", means="Meaning", unit="Unit", fitted_before=("Fitted windows, start", Kind.NUMBER),
+    error="Error", means=("Meaning", Kind.LONG), unit="Unit", fitted_before=("Fitted windows, start", Kind.NUMBER),
     fitted_after=("estimate", Kind.NUMBER),
     held_before=("Held-out windows, start", Kind.NUMBER), held_after=("estimate", Kind.NUMBER),
     change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),

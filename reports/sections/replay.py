@@ -20,8 +20,8 @@ TEXT = (
     "deviations of the measurement noise; windows held out of an identification are shaded."
 )
 METRICS = columns(
-    who="Engine", metric="Metric", means="Meaning", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
-    expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER),
+    who="Engine", metric="Metric", means=("Meaning", Kind.LONG), channel="Channel",
+    value=("Value", Kind.NUMBER), unit="Unit", expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER),
     verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 MEANS = {

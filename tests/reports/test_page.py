@@ -562,6 +562,16 @@ def test_a_page_of_given_sections() -> None:
     assert value_of(drawn)["data"][0]["name"] == HOSTILE
 
 
+def test_a_long_text_is_folded_and_a_short_one_keeps_its_lines() -> None:
+    rows = [{"a": "one\ntwo\n"}, {"a": "0\n1\n" * 500}]
+    given = Table(title="Files", columns=columns(a=("A", Kind.CODE)), rows=rows)
+    text = html.render(
+        [Page(name="some", title="Some", sections=[Section(name="s", title="S", tables=(given,))])], (), ""
+    )
+    assert '<td class="code"><code>one\ntwo</code></td>' in text
+    assert '<td class="code"><details><summary>1999 characters</summary><code>0\n1\n' in text
+
+
 def test_a_column_without_a_value_is_left_out() -> None:
     rows = [{"a": "x", "b": None, "c": float("nan"), "d": 0.0}, {"a": "y", "b": "", "c": None, "d": None}]
     given = Table(title="Numbers", columns=columns(a="A", b="B", c=("C", Kind.NUMBER), d=("D", Kind.NUMBER)), rows=rows)
