@@ -26,8 +26,9 @@
       at[last] = value;
     }
     for (const key of axes(out)) if (key[0] === "y") out[key] = { ...out[key], automargin: true }; // titles beside long ticks
+    out.legend = { ...out.legend, tracegroupgap: 0 };
     if (innerWidth < 600) {
-      out.margin = { ...out.margin, l: 58, r: 6, t: out.showlegend === false ? 10 : out.margin.t }; // no buttons there
+      out.margin = { ...out.margin, l: 58, r: 6, t: out.showlegend === false ? (out.annotations?.length ? 24 : 10) : out.margin.t }; // no buttons there
       out.font = { ...out.font, size: 10 };
       for (const key of axes(out)) {
         if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
@@ -205,6 +206,23 @@
     marks();
   });
 
+  // Columns of plots do not fit a narrow screen: there they stand below each other, each with its own title and ticks.
+  const stacked = (box, { layout }) => {
+    const pairs = axes(layout).filter((key) => key[0] === "x").map((key) => [layout[key], layout[`yaxis${(layout[key].anchor ?? "y").slice(1)}`]]);
+    if (box.clientWidth > 600 || !pairs.some(([x]) => x.domain?.[0] > 0)) return;
+    const over = ([x, y]) => (layout.annotations ?? []).filter((head) => head.xref === "paper" && Math.abs(head.y - y.domain[1]) < 1e-9
+      && x.domain[0] < head.x && head.x < x.domain[1]);
+    const heads = pairs.map(over);
+    const tall = layout.height / new Set(pairs.map(([, y]) => y.domain[1])).size;
+    layout.height = tall * pairs.length;
+    pairs.forEach(([x, y], i) => {
+      const top = 1 - i / pairs.length;
+      [x.domain, y.domain, x.showticklabels] = [[0, 1], [top - 1 / pairs.length + (i < pairs.length - 1 ? 80 / layout.height : 0), top], true];
+      heads[i].forEach((head) => { [head.x, head.y] = [0.5, top]; });
+    });
+    box.style.height = `${layout.height}px`;
+  };
+
   // On a narrow screen a legend beside the plot would take its room: it goes below, a line an entry.
   const narrow = (box, { data, layout }) => {
     const entries = data.filter((line) => line.name && line.showlegend !== false).length;
@@ -237,6 +255,7 @@
   const make = (box) => {
     const figure = known.get(box);
     const over = named(box, figure);
+    stacked(box, figure);
     narrow(box, figure);
     const mark = document.createElement("div");
     mark.className = "cursor";
