@@ -111,7 +111,7 @@ GAPS_TEXT = (
 )
 GAPS = columns(
     n=("Balls", Kind.NUMBER), who="Engine", machine="Law or rule", most=("Most energy created", Kind.NUMBER),
-    at_s=("Gap of it, s", Kind.NUMBER), at_touch="Touching, nearest to", ideal_from=("Ideal from s", Kind.NUMBER),
+    at_s=("At gap s", Kind.NUMBER), at_touch="Touching, nearest to", ideal_from=("Ideal from s", Kind.NUMBER),
     failed=("Failed", Kind.NUMBER), why=("Comment", Kind.LONG),
 )  # fmt: skip
 STABILITY_TEXT = (
