@@ -207,7 +207,7 @@ def test_a_lower_bound_is_told_as_it_was_given(
     assert code(*asked, "--out", tmp_path) == 1
     told = capsys.readouterr().out
     assert re.search(r"outside: reference:compiled fit_th1 is [\d.]+ %, valid: at least 99\.9995\. ", told), told
-    assert re.search(r"outside: reference:compiled rmse_th1 is [\d.e-]+ rad, limit 1e-09\. ", told)
+    assert re.search(r"outside: reference:compiled rmse_th1 is [\d.e-]+ rad, valid: at most 1e-09\. ", told)
 
 
 def test_what_was_identified_is_replayed_as_replay_does(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from study_pages import commands
@@ -11,6 +13,7 @@ from crossbody.cases import Tier
 from crossbody.reports.cli import main
 from crossbody.reports.pages import case_page, figures
 from crossbody.reports.pages.results import Results, read
+from crossbody.reports.sections import replay
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +61,17 @@ def test_provenance_has_a_line_for_every_fact_and_none_for_nothing(found: Result
     assert len(rows["log: sha256"]) == 64
     assert "," in rows["versions"]
     assert not {"None", "[]", "{}", "False", ""} & set(rows.values())
+
+
+def test_a_limit_of_a_replay_is_said_as_it_was_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["replay", *commands(tmp_path)["replay"], "--limit", "fit=99.5", "--limit", "rmse_th1=1e-6"]
+    with pytest.raises(SystemExit) as end:
+        main([*asked, "--out", str(tmp_path / "out")])
+    assert end.value.code == 1
+    said = capsys.readouterr().out
+    (section,) = (one for one in replay.sections(tmp_path / "out") if one.name == "replay")
+    valid = {row["metric"]: row["valid"] for row in section.tables[0].rows if row["valid"]}
+    assert valid == {"fit": "at least 99.5", "rmse": "at most 1e-06"}
+    for words in valid.values():
+        assert f"valid: {words}. Asked for by --limit." in " ".join(said.split())
+        assert f"({words})" in section.text
