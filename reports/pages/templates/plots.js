@@ -147,10 +147,16 @@
       const inside = over.dataset.named === "marks";
       const lines = box.data.filter((line) => own(line) && (line.yaxis || "y") === key);
       const ends = lines.map((line) => [line, left(line, x, y)]).filter(([, at]) => at).sort(([, a], [, b]) => a[1] - b[1]);
+      const points = inside ? lines.flatMap((one) => [...one.x].map((at, i) => [x.d2p(at), y.d2p(one.y[i])])) : [];
+      const covered = (at, height, wide, side) => { // marks under a name on one side of its own; infinitely many where it has no room
+        const [from, to] = [at + 2 * side, at + side * (wide + ROOM)].sort((a, b) => a - b);
+        if (from < 0 || to - ROOM > x._length) return Infinity;
+        return points.filter(([px, py]) => px > from && px < to && Math.abs(py - height) < TALL - 3).length;
+      };
       spread(ends.map(([, at]) => at[1]), y._length).forEach((middle, k) => {
         const [{ title, wide, line, marker }, at] = ends[k];
         const { color } = line || marker;
-        const side = inside && at[0] + wide > x._length ? -1 : 1; // of a mark, what has room
+        const side = inside && covered(at[0], middle, wide, -1) < covered(at[0], middle, wide, 1) ? -1 : 1;
         const [there, height] = [inside ? x._offset + at[0] + side * ROOM : right + ROOM, y._offset + middle];
         const text = drawing("text", { x: there + 3 * side, y: height + 4, "text-anchor": side < 0 ? "end" : "start" }, title);
         if (inside) text.setAttribute("class", "inside");
