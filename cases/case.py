@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 
 Value = float | int | str | bool
+SWITCH = {"True": True, "False": False}
+"""Words of a parameter that is true or false, as they are shown."""
 
 
 class Tier(StrEnum):
@@ -64,6 +66,8 @@ class Parameter:
         """Its words or its interval; empty for any text."""
         if isinstance(self.default, str):
             return ", ".join(self.choices)
+        if isinstance(self.default, bool):
+            return ", ".join(SWITCH)
         opens = "(" if self.open_low or math.isinf(self.low) else "["
         return f"{opens}{self.low:g}, {self.high:g}{')' if math.isinf(self.high) else ']'}"
 
@@ -80,16 +84,15 @@ class Parameter:
         try:
             if not isinstance(value, (int, float, str, np.number, np.bool_)):
                 raise TypeError
-            number = float(value)
+            number = float(SWITCH.get(str(value), value) if isinstance(self.default, bool) else value)
         except (TypeError, ValueError, OverflowError):
-            raise InvalidValue(f"{where} is {shown(value)}; it must be a number [{self.unit or '-'}].") from None
+            wanted = "True or False" if isinstance(self.default, bool) else f"a number{self.unit and f' [{self.unit}]'}"
+            raise InvalidValue(f"{where} is {shown(value)}; it must be {wanted}.") from None
         if not math.isfinite(number) or not self.low <= number <= self.high or (self.open_low and number == self.low):
             raise InvalidValue(f"{where} is {number:g}; valid: {f'{self.valid} {self.unit}'.rstrip()}.")
-        if isinstance(self.default, int) and not isinstance(self.default, bool):
-            if number != int(number):
-                raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")
-            return int(number)
-        return number
+        if isinstance(self.default, int) and number != int(number):
+            raise InvalidValue(f"{where} is {number:g}; it must be a whole number.")
+        return int(number) if isinstance(self.default, int) and not isinstance(self.default, bool) else number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,12 +22,14 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+import re
 from collections.abc import Iterable
 from enum import StrEnum
 from typing import Any
 
 SHOWN = 80
-LISTED = 20  # files of a folder that are named at most
+LISTED = 20  # files of a folder, or of many names, that are named at most
+NAMED = 60  # names that are listed in full
 
 
 def several(count: int, one: str, many: str = "") -> str:
@@ -59,10 +61,10 @@ def _again(kind: type[CrossbodyError], told: tuple[Any, ...], state: dict[str, A
 
 
 class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other names here do
-    """A name that nobody knows; the message lists those that exist.
+    """A name that nobody knows; the message lists those that exist, or the nearest of many.
 
     Args:
-        kind: what was named, for example "case".
+        kind: what was named, for example "case" or "variant of bouncing_ball".
         name: the name that was given.
         known: the names that exist.
     """
@@ -73,7 +75,12 @@ class UnknownName(CrossbodyError):  # noqa: N818 - says what it is, as the other
         close = difflib.get_close_matches(_stem(name), stems, n=1) if isinstance(name, str) else ()
         hint = f" Did you mean {stems[close[0]]!r}?" if close else ""
         others = f"Known: {', '.join(self.known)}." if self.known else "There are none."
-        super().__init__(f"There is no {kind} {shown(name)}.{hint} {others}")
+        if len(self.known) > NAMED and isinstance(name, str):
+            near = difflib.get_close_matches(_stem(name), stems, n=LISTED, cutoff=0.0)
+            others = f"Known are {len(self.known)}, of which the nearest: {', '.join(stems[one] for one in near)}."
+        what, *where = re.split(r"(?= of | in | \()", kind, maxsplit=1)
+        self.advice = f".{hint} {others}"
+        super().__init__(f"There is no {what} {shown(name)}{''.join(where)}{self.advice}")
 
 
 def _stem(name: str) -> str:
@@ -98,7 +105,7 @@ class NoFile(UnknownName):
             beside = sorted(one.name for one in found if suffix and one.name.endswith(suffix) and one.is_file())
             known = (*known, *beside[:LISTED])
         super().__init__(kind, name, known)
-        told = str(self).partition(f"{shown(name)}")[2]
+        told = self.advice
         if os.path.exists(text):
             told = ": it is a folder, a pipe or a device."
         elif folder and not os.path.isdir(folder):

@@ -114,19 +114,13 @@ def rough(scene: Scene) -> Contact | None:
 
 def frictional(scene: Scene) -> str | None:
     """Return why an engine that has no rows with friction cannot run a scene; None if it can."""
-    first, dry = rough(scene), next((part for part, _ in scene.dry), None)
-    theirs = "mujoco:as_is and mujoco:default"
-    if first is not None:
+    if (first := rough(scene)) is not None:
         what = f"Pair {first.pair.name!r} has friction"
-        theirs += ", pinocchio:admm, drake:matched and default, dart:matched and default"
-    elif dry is not None:
-        what = f"{type(dry).__name__} {dry.name!r} has dry friction (friction_loss)"
+    elif dry := [part for part, _ in scene.dry]:
+        what = f"{type(dry[0]).__name__} {dry[0].name!r} has dry friction (friction_loss)"
     else:
         return None
-    return (
-        f"{what}. reference:compiled and reference:cvode follow its law; {theirs} follow laws of their own. "
-        "For a file, without=friction removes it in every engine."
-    )
+    return f"{what}, for which this profile has no law. For a file, --without friction removes it in every engine."
 
 
 def inert(scene: Scene) -> tuple[Pair, ...]:

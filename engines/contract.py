@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from crossbody.cases import CaseUnsupported
 
 if TYPE_CHECKING:
-    from crossbody.cases import Case, Trajectory
+    from crossbody.cases import Case, Parameter, Trajectory
     from crossbody.engines.linear import Spot, Tangent
 
 QUANTITIES = ("masses", "gravity", "constants", "q0", "v0", "M", "bias", "H", "lam", "ledger")
@@ -112,6 +112,25 @@ class Engine(ABC):
     def planned(self, case: Case, profile: str = "matched", **settings: Any) -> Mapping[str, Any]:
         """Return the settings that a run would have; an engine that compiles for one overrides this."""
         return self.prepare(case, profile, **settings).settings
+
+    def offered(self, case: Case, profile: str = "matched") -> Mapping[str, Parameter]:
+        """Return the settings that a user may give: those that `planned` names where it is asked for another.
+
+        What a run has beside them, such as its method, is fixed by the profile.
+
+        Raises:
+            CaseUnsupported: for a case that the engine cannot do.
+        """
+        from crossbody.cases import Parameter, UnknownName  # NumPy, which a list of names does not need
+        from crossbody.engines.settings import UnknownSetting
+
+        try:
+            self.planned(case, profile, **{"": 0.0})
+        except UnknownSetting as error:
+            return error.settings
+        except (UnknownName, TypeError):  # an engine of a user's own, which refuses in its own way
+            pass
+        return {name: Parameter(default=value) for name, value in self.planned(case, profile).items()}
 
     def linearise(self, case: Case, spot: Spot) -> tuple[Tangent, ...]:
         """Return its derivatives of the accelerations at an equilibrium of the case, by each way that it has.

@@ -11,17 +11,25 @@ from crossbody.cases.arguments import instance
 MATCHED = "matched"
 
 
+class UnknownSetting(UnknownName):
+    """A setting that an engine does not have; `settings` are those that it has, by their names."""
+
+    def __init__(self, kind: str, name: str, settings: Mapping[str, Parameter]) -> None:
+        super().__init__(kind, name, settings)
+        self.settings = dict(settings)
+
+
 def chosen(engine: str, profile: str, known: Mapping[str, Parameter], given: Mapping[str, Any]) -> dict[str, Value]:
     """Every setting's value: the user's where given, else the default.
 
     Raises:
-        UnknownName: for a setting that the profile does not have; the valid ones are listed.
+        UnknownSetting: for a setting that the profile does not have; the valid ones are listed.
         InvalidValue: for a value outside what the setting admits.
     """
     where = f"{engine}:{profile}"
     for name in given:
         if name not in known:
-            raise UnknownName(f"setting of {where}", name, known)
+            raise UnknownSetting(f"setting of {where}", name, known)
     return {name: p.checked(f"{where}: {name}", given.get(name, p.default)) for name, p in known.items()}
 
 

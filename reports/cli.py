@@ -83,7 +83,7 @@ def _do(where: str, *given: Any, **asked: Any) -> int:
 
 @cli.command()
 @options.cases
-@click.option("--rtol", type=float, metavar="R", help="Tolerance, for the engines that have one.")
+@click.option("--rtol", type=options.NUMBER, metavar="R", help="Tolerance, for the engines that have one.")
 @click.option(
     "--set-engine", "settings", metavar="[E[:PROFILE].]K=V", multiple=True,
     help="Setting of one engine, or of all engines that have it; repeatable.", shell_complete=options.settings_of,
@@ -108,9 +108,10 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     if dry:
         words = ("names", "wanted", "variant", "pairs", "rtol", "settings", "out", "against", "others", "limit")
         return _do("planned.tell", **{name: asked[name] for name in words})
-    from crossbody.reports.runs import choice  # wrong words are reported before all else is imported
+    from crossbody.reports.runs import choice, output  # wrong words are reported before all else is imported
 
     given = choice.parse_settings(asked["pairs"])
+    output.check(asked["out"], "run")
     cases = choice.load_cases(asked["names"], asked.pop("variant"), given, asked["limit"])
     return _do("run.run", cases, **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
 
@@ -123,7 +124,9 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     is_flag=True,
     help="Every case and every rung of every ladder; without it, a selection that takes some minutes.",
 )
-@click.option("--minutes", type=options.Number(0.1), help="Approximate total time; ladders are shortened to meet it.")
+@click.option(
+    "--minutes", type=options.Number(0.1), metavar="M", help="Approximate total time; ladders are shortened to meet it."
+)
 @click.option("--against", type=options.PATH, metavar="BASE", help="Folder of an earlier benchmark.")
 @click.option("--skip", "what", flag_value="skip", help="Instead: measure the work that a scene avoids.")
 @click.option("--throughput", "what", flag_value="throughput", help="Instead: measure many runs at once, in threads.")
@@ -144,10 +147,12 @@ def bench(what: str | None, **asked: Any) -> int:
 @cli.command()
 @click.option(
     "--n", "counts", type=options.Whole(2, 200), multiple=True, default=(3, 5), show_default=True,
-    help="Number of balls; repeatable.",
+    metavar="N", help="Number of balls; repeatable.",
 )  # fmt: skip
 @options.wanted
-@click.option("--points", type=options.Whole(2, 10_000), default=61, show_default=True, help="Gaps from s = 0 to 3.")
+@click.option(
+    "--points", type=options.Whole(2, 10_000), default=61, show_default=True, metavar="N", help="Gaps from s = 0 to 3."
+)
 @options.out()
 @speaks
 def gapmap(**asked: Any) -> int:
@@ -170,8 +175,8 @@ def stability(**asked: Any) -> int:
 @cli.command()
 @click.argument("names", metavar="[SUITE]...", nargs=-1, shell_complete=options.names_of("reports.suites"))
 @options.wanted
-@click.option("--runs", type=int, metavar="N", help="Number of runs of the first engine, over all suites.")
-@click.option("--seed", type=options.Whole(0), default=0, show_default=True, help="Seed of all draws.")
+@click.option("--runs", type=options.COUNT, metavar="N", help="Number of runs of the first engine, over all suites.")
+@click.option("--seed", type=options.Whole(0), default=0, show_default=True, metavar="N", help="Seed of all draws.")
 @click.option("--jobs", type=options.Whole(0, 1024), default=0, metavar="J", help="Processes; 0: one per processor.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
 @click.option(
@@ -258,12 +263,15 @@ def report(folder: Path, **asked: Any) -> int:
     "--engine", "-e", metavar="E[:PROFILE]", default="truth", show_default=True, help="Engine whose motion is drawn."
 )
 @click.option(
-    "--at", "instant", metavar="S", type=float, help="Time of the picture, s; 0 if not given. A GIF has none."
+    "--at", "instant", metavar="S", type=options.NUMBER, help="Time of the picture, s; 0 if not given. A GIF has none."
 )
-@click.option("--fps", type=options.ABOVE_0, default=25.0, show_default=True, help="Frames per second of a GIF.")
 @click.option(
-    "--speed", type=options.ABOVE_0, default=1.0, show_default=True, help="Speed of a GIF, as a multiple of real time."
+    "--fps", type=options.ABOVE_0, default=25.0, show_default=True, metavar="F", help="Frames per second of a GIF."
 )
+@click.option(
+    "--speed", type=options.ABOVE_0, default=1.0, show_default=True, metavar="X",
+    help="Speed of a GIF, as a multiple of real time.",
+)  # fmt: skip
 @speaks
 def picture(folder: Path, out: Path, case: str, engine: str, instant: float | None, fps: float, speed: float) -> int:
     """Draw a motion of an earlier run.
@@ -338,13 +346,20 @@ def replay(wanted: tuple[str, ...], limit: float, closed_loop: bool, out: Path, 
     "--free", "-f", metavar="NAME", multiple=True, required=True, help="Parameter to fit, or delay; repeatable.",
     shell_complete=options.free_of,
 )  # fmt: skip
-@click.option("--hold", type=int, default=2, show_default=True, help="Hold every N-th window out of the fit; 0: none.")
+@click.option(
+    "--hold", type=options.COUNT, default=2, show_default=True, metavar="N",
+    help="Hold every N-th window out of the fit; 0: none.",
+)  # fmt: skip
 @click.option(
     "--starts", type=click.Choice(["auto", "measured", "free"]), default="auto", show_default=True,
     help="Initial states of the windows: measured, or free unknowns.",
 )  # fmt: skip
-@click.option("--stride", type=int, default=1, show_default=True, help="Compare every N-th sample.")
-@click.option("--budget", type=float, default=300.0, show_default=True, metavar="S", help="Time for the search, s.")
+@click.option(
+    "--stride", type=options.COUNT, default=1, show_default=True, metavar="N", help="Compare every N-th sample."
+)
+@click.option(
+    "--budget", type=options.NUMBER, default=300.0, show_default=True, metavar="S", help="Time for the search, s."
+)
 @options.time_limit("Stop after this time, s, with the best values so far, and terminate a run that does not return.")
 @speaks
 def identify(
@@ -367,7 +382,7 @@ def log() -> None:
 @log.command("info")
 @click.argument("path", metavar="LOG", type=options.PATH)
 @click.option("--columns", metavar="MAP", help="Column map (TOML) to apply.")
-@click.option("--part", type=int, metavar="N", help="Number of the run, if the map separates several.")
+@click.option("--part", type=options.COUNT, metavar="N", help="Number of the run, if the map separates several.")
 @click.option("--draft", is_flag=True, help="Print only a draft of a column map.")
 @options.memory
 @speaks

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from crossbody.reports import layout
 
 if TYPE_CHECKING:
-    from crossbody.cases import Parameter
+    from crossbody.cases import Case, Parameter, Value
 
 Named = dict[str, dict[str, str]]  # heading -> name -> one line
 EVERYTHING = "(-inf, inf)"
@@ -33,40 +33,75 @@ def case(name: str) -> Named:
     name, wanted = loading.parted(name)
     source = loading.module(name)
     found = {variant: cases.load(name, variant) for variant in ((wanted,) if wanted else source.VARIANTS)}
-    parameters = {key: _parameter(each) for key, each in source.PARAMETERS.items()}
+    values = found[wanted].parameters if wanted else {}
+    parameters = {key: _parameter(each, values.get(key, each.default)) for key, each in source.PARAMETERS.items()}
     own = {key: f"{metric.doc} [{metric.unit}]" for one in found.values() for key, metric in one.metrics.items()}
     rows = {row: "" for one in found.values() for row in one.contacts}
     told = {
-        "Variants": {variant: one.title for variant, one in found.items()},
+        "Variants": {variant: f"{one.title}{_changes(one, source.PARAMETERS)}" for variant, one in found.items()},
         "Parameters": parameters, "Rows": rows, "Metrics of its own": own,
     }  # fmt: skip
     return {title: named for title, named in told.items() if named}
 
 
-def _parameter(one: Parameter) -> str:
-    """Return its sentence, its default with the unit, and what is valid where that is bounded."""
-    default = f"{one.default:g}" if isinstance(one.default, float) else str(one.default)
-    told = [f"{default} {one.unit}".strip(), "" if one.valid == EVERYTHING else one.valid]
+def _changes(case: Case, known: Mapping[str, Parameter]) -> str:
+    """Return what a variant sets to something else than the defaults."""
+    values = case.parameters
+    told = ", ".join(f"{key} {_plain(values[key])}" for key, one in known.items() if values[key] != one.default)
+    return f" ({told})" if told else ""
+
+
+def _parameter(one: Parameter, *values: Value) -> str:
+    """Return its sentence, its values with the unit, and what is valid where that is bounded."""
+    told = [f"{', '.join(map(_plain, values))} {one.unit}".strip(), "" if one.valid == EVERYTHING else one.valid]
     return f"{one.doc} ({'; '.join(filter(None, told)) or 'empty'})"
+
+
+def _plain(value: Value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def engine(name: str) -> Named:
     """Return profiles of an engine, the settings that each has for the bouncing ball, and versions of its packages."""
     from crossbody import cases, engines
+    from crossbody.engines.settings import profile_of
     from crossbody.reports.judging.stored import words
 
-    found, ball, settings = engines.load(name), cases.load("bouncing_ball"), dict[str, str]()
-    for profile in found.profiles:
-        with suppress(cases.CaseUnsupported):
-            settings[profile] = words(found.planned(ball, profile))
-    return {"Profiles": dict(found.profiles), "Settings for bouncing_ball": settings, "Versions": dict(found.versions)}
+    name, _, wanted = name.partition(":")
+    found, ball = engines.load(name), cases.load("bouncing_ball")
+    profiles = {wanted: found.profiles[profile_of(name, found.profiles, wanted)]} if wanted else dict(found.profiles)
+    able = [profile for profile in profiles if found.why_not(ball, profile) is None]
+    used = {profile: found.planned(ball, profile) for profile in able}
+    offered = {profile: found.offered(ball, profile) for profile in able}
+    told = {
+        "Profiles": profiles,
+        "Settings for bouncing_ball": {
+            key: _setting(each, {profile: used[profile][key] for profile in able if key in offered[profile]}, len(able))
+            for key, each in {key: one for mine in offered.values() for key, one in mine.items()}.items()
+        },
+        "Fixed for bouncing_ball": {
+            profile: words({key: value for key, value in used[profile].items() if key not in offered[profile]})
+            for profile in able
+        },
+        "Versions": dict(found.versions),
+    }
+    return {title: named for title, named in told.items() if any(named.values()) or title == "Versions"}
+
+
+def _setting(one: Parameter, values: Mapping[str, Value], profiles: int) -> str:
+    """Return a setting with its value, or with those of the profiles where they differ or some have none."""
+    owners: dict[Value, list[str]] = {}
+    for profile, value in values.items():
+        owners.setdefault(value, []).append(profile)
+    told = (f"{' and '.join(who)}: {_plain(value)}" for value, who in owners.items())
+    return _parameter(one, *(owners if len(owners) == 1 and len(values) == profiles else told))
 
 
 def model(name: str) -> Named:
     """Return the parameters of a model of logs."""
     from crossbody.hw import models
 
-    return {"Parameters": {key: _parameter(each) for key, each in models.load(name).parameters.items()}}
+    return {"Parameters": {key: _parameter(each, each.default) for key, each in models.load(name).parameters.items()}}
 
 
 def one(name: str) -> Named:
@@ -76,9 +111,10 @@ def one(name: str) -> Named:
     from crossbody.hw import models
 
     known = (*cases.names(), *engines.names(), *models.names())
-    if "." not in name and parted(name)[0] not in known:
-        raise cases.UnknownName("case, engine or model", name, known)
-    return engine(name) if name in engines.names() else model(name) if name in models.names() else case(name)
+    head = name if "." in name else parted(name)[0]
+    if "." not in name and head not in known:
+        raise cases.UnknownName("case, engine or model", head, known)
+    return engine(name) if head in engines.names() else model(name) if name in models.names() else case(name)
 
 
 def text(told: Named) -> str:

@@ -44,6 +44,13 @@ def unit_text(unit: str, form: str = " {}") -> str:
     return "" if unit in ("", "1") else form.format(unit)
 
 
+def valid(best: float, most: float) -> str:
+    """Return what a limit on the distance from the best number admits, in words; nothing without a limit."""
+    if most != most:
+        return ""
+    return f"at least {best - most:.6g}" if best else f"at most {most:.4g}"
+
+
 def laid_out(
     names: Sequence[str], cells: Mapping[str, Sequence[str]], width: int, *, head: str = "",
     above: Sequence[str] = (), left_out: Sequence[str] = (), colours: Mapping[str, str] | None = None,

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES, Panels
+from crossbody.reports.figures.styles import Panels, look
 
+FLOOR = 1e-16  # least error that is drawn
 APART = 1.0  # decades of error between two labels of a line, twice the decades of time
 
 
@@ -20,32 +22,52 @@ def work_precision(rows: pd.DataFrame) -> Figure:
     error = rows["error"].astype(float)
     finite = error[np.isfinite(error) & (error > 0.0)]
     edge = 10.0 * float(finite.max()) if len(finite) else 1.0
-    floor = 1e-16
     for i, ((case, engine, profile), group) in enumerate(
         rows.groupby(["case", "engine", "profile"], sort=False), start=1
     ):
-        failed = ~np.isfinite(group["error"].astype(float))
-        x = group["error"].astype(float).where(~failed, edge).clip(lower=floor)
+        x = group["error"].astype(float)
         label = f"{engine}:{profile}" if rows["case"].nunique() == 1 else f"{case} {engine}:{profile}"
-        panels.add(
-            x=x, y=group["median_ms"], name=label, mode="lines+markers+text",
-            text=_labels(x, group["median_ms"], group["setting"]),
-            customdata=group["setting"], hovertemplate="%{customdata:.0e}: error %{x:.2g}, %{y:.3g} ms",
-            textposition="top center", textfont={"size": 9},
-            line={"color": COLOURS[i % len(COLOURS)], "dash": DASHES[i % len(DASHES)]},
-            marker={"symbol": np.where(failed, "x", "circle"), "size": 8},
-            error_y={"type": "data", "array": group["iqr_ms"] / 2, "thickness": 1},
-        )  # fmt: skip
+        told = {"name": label, "legendgroup": label}
+        reached = np.isfinite(x)
+        if reached.any():
+            _add(panels, group[reached], x[reached].clip(lower=FLOOR), told | _line(group[reached], look(i)))
+        if not reached.all():  # no line leads there: nobody knows how far off they are
+            marks = {"mode": "markers", "marker": {"symbol": "x", "size": 8, "color": look(i)["color"]}}
+            _add(
+                panels,
+                group[~reached],
+                pd.Series(edge, group.index[~reached]),
+                told | marks | {"showlegend": not reached.any()},
+            )
     panels.axes("x", type="log", title="relative error of position and event times", exponentformat="power")
     panels.axes("y", type="log", title="run time, median [ms]", exponentformat="power")
     return panels.figure()
+
+
+def _line(group: pd.DataFrame, style: dict[str, Any]) -> dict[str, Any]:
+    """How the rungs that reach an error are drawn."""
+    return {
+        "mode": "lines+markers+text", "text": _labels(group["error"], group["median_ms"], group["setting"]),
+        "textposition": "top center", "textfont": {"size": 9}, "marker": {"symbol": "circle", "size": 8},
+        "line": {key: style[key] for key in ("color", "dash")},
+    }  # fmt: skip
+
+
+def _add(panels: Panels, group: pd.DataFrame, x: pd.Series, more: dict[str, Any]) -> None:
+    panels.add(
+        x=x, y=group["median_ms"], customdata=group["setting"],
+        hovertemplate="%{customdata:.0e}: error %{x:.2g}, %{y:.3g} ms",
+        error_y={"type": "data", "array": group["iqr_ms"] / 2, "thickness": 1}, **more,
+    )  # fmt: skip
 
 
 def _labels(x: pd.Series, y: pd.Series, setting: pd.Series) -> list[str]:
     """Tolerance or step of the rungs that stand apart from the last one that has a label."""
     found: list[str] = []
     last = (math.inf, math.inf)
-    for here, s in zip(zip(np.log10(x), np.log10(y.astype(float)), strict=True), setting.astype(float), strict=True):
+    for here, s in zip(
+        zip(np.log10(x.clip(lower=FLOOR)), np.log10(y.astype(float)), strict=True), setting.astype(float), strict=True
+    ):
         apart = abs(here[0] - last[0]) > APART or abs(here[1] - last[1]) > 0.5 * APART
         found.append(f"{s:.0e}" if apart and np.isfinite(s) else "")
         last = here if apart else last

@@ -105,7 +105,7 @@ def settings_of(context: click.Context, _parameter: click.Parameter, begun: str)
     from crossbody import cases, engines
     from crossbody.reports.runs.choice import DEFAULT_ENGINES, parse_engine
 
-    found: dict[str, None] = {}
+    found: dict[str, str] = {}
     wanted = context.params.get("wanted") or [one for one in DEFAULT_ENGINES if one in engines.names()]
     for name, profile in map(parse_engine, wanted):
         if not (begun.startswith(f"{name}.") or name.startswith(begun)):
@@ -114,8 +114,20 @@ def settings_of(context: click.Context, _parameter: click.Parameter, begun: str)
             case, engine = cases.load((_given(context) or ["bouncing_ball"])[0]), engines.load(name)
             for each in (profile,) if profile else engine.profiles:
                 with suppress(cases.CaseUnsupported):
-                    found |= dict.fromkeys(f"{name}.{key}=" for key in engine.planned(case, each))
-    return [CompletionItem(name) for name in found if name.startswith(begun)]
+                    found |= {f"{name}.{key}=": one.doc for key, one in engine.offered(case, each).items()}
+    return [CompletionItem(name, help=doc) for name, doc in found.items() if name.startswith(begun)]
+
+
+class _Number(click.types.FloatParamType):
+    name = "number"
+
+
+class _Count(click.types.IntParamType):
+    name = "whole number"
+
+
+NUMBER, COUNT = _Number(), _Count()
+"""Numbers that are checked by what uses them; what is none is told in words."""
 
 
 class Whole(click.IntRange):
@@ -213,20 +225,20 @@ def parameters(command: _Work) -> _Work:
         taking,
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.",
                      shell_complete=parameters_of),
-        click.option("--t-end", type=float, metavar="S", help="Horizon, s; same as --set t_end=S."),
+        click.option("--t-end", type=NUMBER, metavar="S", help="Horizon, s; same as --set t_end=S."),
         click.option("--law", metavar="a0=,a1=", help="Constants of all rows; same as --set for each constant."),
         click.option("--ctrl", metavar="FILE", help="Robot file: table of controls (CSV, Parquet, NPZ)."),
         click.option(
             "--control", metavar="FILE.py:NAME",
             help="Robot file: your own callable (t, q, v) -> u, or a class of such callables.",
         ),
-        click.option("--tick", type=float, metavar="S", help="Time between calls of --control, s; 1e-3 if not given."),
+        click.option("--tick", type=NUMBER, metavar="S", help="Time between calls of --control, s; 1e-3 if not given."),
         click.option(
             "--push", type=(str, *(float,) * 5), multiple=True, metavar="BODY FX FY FZ T0 T1",
             help="Robot file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
         ),
         click.option("--without", metavar="PARTS", help="Robot file: parts to leave out in every engine."),
-        click.option("--rank", type=int, metavar="N", help="Robot file: number of independent rows of its loops."),
+        click.option("--rank", type=COUNT, metavar="N", help="Robot file: number of independent rows of its loops."),
     )  # fmt: skip
     return found
 
@@ -245,15 +257,15 @@ def replayed(command: _Work) -> _Work:
         click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them.",
                      shell_complete=names_of("hw.models")),
         click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
-        click.option("--part", type=int, metavar="N", help="Number of the run, if the map separates several."),
+        click.option("--part", type=COUNT, metavar="N", help="Number of the run, if the map separates several."),
         click.option(
             "--repair", metavar="R", multiple=True, help="fill_dropped, drop_duplicates or unwrap; repeatable."
         ),
         memory,
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the model; repeatable."),
-        click.option("--restart", type=float, metavar="S", help="Time between restarts, s; 0 for a free run."),
-        click.option("--horizon", type=float, metavar="S", help="Length of a window, s; if not to the next restart."),
-        click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of the measurement, s."),
+        click.option("--restart", type=NUMBER, metavar="S", help="Time between restarts, s; 0 for a free run."),
+        click.option("--horizon", type=NUMBER, metavar="S", help="Length of a window, s; if not to the next restart."),
+        click.option("--delay", type=NUMBER, default=0.0, metavar="S", help="Delay of the measurement, s."),
         click.option(
             "--limit", "limits", metavar="NAME=V", multiple=True,
             help="Limit on a metric, for example fit=90 or rmse_th1=0.01; repeatable.",

@@ -12,11 +12,13 @@ import click
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Value
 from crossbody.cases.errors import several
+from crossbody.cases.files.case import PARAMETERS
 from crossbody.reports import layout, voice
 from crossbody.reports.judging.stored import words
 from crossbody.reports.pages import results
 from crossbody.reports.runs import choice, output
 
+Named = Mapping[str, str]
 RUBS = "if its motion comes to a contact with friction"
 """When the rows of a file's contacts are run: the motion tells, which a plan does not follow."""
 
@@ -54,15 +56,40 @@ def tell(
     if voice.as_json():
         voice.result(json.dumps([_plain_plan(*one) for one in found], default=str))
         return 0
+    firsts: dict[tuple[str, str], tuple[str, Named, Named]] = {}  # of each case: label, parameters and engines
     for case, condition, known in found:
-        parameters = ", ".join(f"{name} {_plain(value)}" for name, value in case.parameters.items())
         counts = f"{several(len(case.v0), 'velocity', 'velocities')}, {several(len(case.contacts), 'row')}"
         click.echo(layout.told(f"{case.label}{condition and f', {condition}'}: {counts}, {case.t_end:g} s"))
-        click.echo(layout.told(f"  parameters: {parameters}") if parameters else "  no parameters")
-        for engine, profile, told in known:
-            line = f"  {engine}:{profile}  {told if isinstance(told, str) else words(told)}"
-            click.echo(layout.told(line.rstrip()))
+        mine = {
+            f"{engine}:{profile}": told if isinstance(told, str) else words(told) for engine, profile, told in known
+        }
+        label, parameters, runs = firsts.get((case.name, condition), ("", {}, {}))
+        for line in (_parameter_line(_parameters(case), parameters, label), *_engine_lines(mine, runs, label)):
+            click.echo(layout.told(f"  {line}".rstrip()))
+        firsts.setdefault((case.name, condition), (case.label, _parameters(case), mine))
     return 0
+
+
+def _parameters(case: Case) -> Named:
+    """Return the parameters of a case as they are shown; of a file those that differ from what it says itself."""
+    usual = {key: one.default for key, one in PARAMETERS.items()} if case.file else {}
+    return {key: _plain(value) for key, value in case.parameters.items() if usual.get(key) != value}
+
+
+def _parameter_line(mine: Named, first: Named, label: str) -> str:
+    """Return the parameters that are not those of the first variant."""
+    own = ", ".join(f"{name} {value}" for name, value in mine.items() if first.get(name) != value)
+    if not label:
+        return f"parameters: {own}" if own else "no parameters, or all at their defaults"
+    return f"parameters: {own}; all others as for {label}" if own else f"parameters as for {label}"
+
+
+def _engine_lines(mine: Named, first: Named, label: str) -> list[str]:
+    """Return a line for every engine that is not run as for the first variant, and one for the others."""
+    lines = [f"{who}  {told}" for who, told in mine.items() if first.get(who) != told]
+    if len(lines) == len(mine):
+        return lines
+    return [*lines, f"{'all other engines' if lines else 'all engines'} as for {label}"]
 
 
 def _conditions(case: Case) -> list[tuple[Case, str]]:
@@ -102,7 +129,8 @@ def _planned(
     given = dict(asked) | ({} if rtol is None else {"rtol": rtol})
     own = [choice.of_case(pick, case) for pick in picks]
     found = [(pick.engine, pick.profile, _settings(case, pick, given)) for pick in own]
-    choice.check_known(asked, [(who, how, told) for who, how, told in found if not isinstance(told, str)])
+    able = [(who, how) for who, how, told in found if asked and not isinstance(told, str)]
+    choice.check_known(asked, [(who, how, engines.load(who).offered(case, how)) for who, how in able])
     return found
 
 
@@ -116,8 +144,7 @@ def _settings(case: Case, pick: choice.Pick, asked: Mapping[str, Value]) -> Mapp
         return f"skipped: {pick.skipped}"
     try:
         engine, own = engines.load(pick.engine), choice.of_pick(asked, pick)
-        told = engine.planned(case, pick.profile)
-        own = {key: value for key, value in own.items() if key in told}
-        return engine.planned(case, pick.profile, **own) if own else told
+        offered = engine.offered(case, pick.profile) if own else {}
+        return engine.planned(case, pick.profile, **{key: value for key, value in own.items() if key in offered})
     except CaseUnsupported as error:
         return f"skipped: {error}"

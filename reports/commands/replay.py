@@ -167,7 +167,9 @@ def run_identify(
             for shown in tables.values():
                 print_rows(shown, 6, heads=HEADS, left_out=SPARED)
                 click.echo()
-            click.echo(f"{layout.told(fit.sensitivities)}\n{layout.told(f'Intervals: {fit.covariance}')}")
+            click.echo(
+                f"{layout.told(f'Derivatives: {fit.sensitivities}')}\n{layout.told(f'Intervals: {fit.covariance}')}"
+            )
         for warning in fit.warnings:
             click.echo(layout.told(f"warning: {warning}"))
         _say_outside(rows)
@@ -220,8 +222,7 @@ def _metrics(found: Comparison, rows: pd.DataFrame) -> pd.DataFrame:
 def _say_outside(rows: pd.DataFrame) -> None:
     """One line a number that is outside its limit."""
     for row in rows[rows["verdict"] == Word.OUTSIDE].to_dict(orient="records"):
-        best, most = row["expected"], row["limit"]
-        bound = f"valid: at least {best - most:.6g}" if best else f"limit {most:.4g}"
+        bound = f"valid: {layout.valid(row['expected'], row['limit'])}"
         who, value = f"{row['engine']}:{row['profile']}", f"{row['value']:.4g}{unit_text(row['unit'])}"
         click.echo(layout.told(f"outside: {who} {row['metric']} is {value}, {bound}. {row['why']}"))
 

@@ -31,6 +31,11 @@ def label(trace: Trace) -> str:
     return f"{trace.about['engine']}:{trace.about['profile']}" if trace.about["engine"] != TRUTH else TRUTH
 
 
+def called(trace: Trace) -> str:
+    """Return how a plot and a button call it: as its label, but a log that stands for the truth "measured"."""
+    return str(trace.about.get("called", label(trace)))
+
+
 def style(trace: Trace, i: int) -> dict[str, Any]:
     """Colour, dash and width of the trace at place i of a case; the truth is a broad grey line.
 

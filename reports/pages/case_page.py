@@ -8,9 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
-from crossbody.reports.figures.styles import label, style
+from crossbody.reports.figures.styles import called, label, style
 from crossbody.reports.judging.told import beyond, share
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
@@ -23,7 +24,7 @@ from crossbody.reports.runs.store import Trace
 
 PLOTTED = 900_000  # room for all plots of a page, bytes; the samples of each line follow from it
 RUNS = columns(
-    who="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
+    called="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
     wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
     samples=("Samples stored", Kind.NUMBER),
     settings=("Settings", Kind.LONG),
@@ -34,8 +35,8 @@ AUDIT = columns(
     verdict=("Same", Kind.VERDICT),
 )  # fmt: skip
 AUDIT_TEXT = (
-    "Before motions are compared, every engine must have the same physics: M, bias, H and lam "
-    "are evaluated at the same random states."
+    "Before motions are compared, every engine must have the same physics: the mass matrix M, the bias forces, the "
+    "Jacobian H of the gaps and the contact forces lam are evaluated at the same random states."
 )
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
 
@@ -45,13 +46,13 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about), word=grid.verdict(rows),
-        engines=[{"name": label(trace), **style(trace, i)} for i, trace in enumerate(traces)],
+        engines=[{"name": label(trace), "shown": called(trace), **style(trace, i)} for i, trace in enumerate(traces)],
         beside=_beside(found, case),
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
             *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
             *precision(found.out, case.label, rows, _walls(found, case), found.places), *studied(found.out, case.about),
-            _runs(traces, case.about), _audit(found, case), provenance(found.told),
+            _runs(traces, case.about), *_audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
 
@@ -66,7 +67,9 @@ def _beside(found: Results, case: CaseFiles) -> tuple[Link | None, Link | None]:
 def _lead(about: Mapping[str, Any]) -> str:
     if not about:
         return "No motion of this case is stored."
-    truth = f" Truth: {about['tier']} ({about['source']})." if about.get("tier") else ""
+    tier = about.get("tier", "")
+    known = f"Truth {tier[:1]}: {tier[2:]}" if tier in set(Tier) else f"Compared with: {tier}"
+    truth = f" {known} ({about['source'].rstrip('.')})." if tier else ""
     title = about["title"].rstrip(".")
     return f"{title[:1].upper()}{title[1:]}.{truth}"
 
@@ -102,10 +105,16 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
         context={
             "rows": [row | {"beyond": beyond(row)} for row in rows],
             "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
-            "judged": any(row["verdict"] != Word.INFO for row in rows),
+            "truths": _truths(case.about), "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
         },
     )  # fmt: skip
+
+
+def _truths(about: Mapping[str, Any]) -> str:
+    """What the letters of truths mean: those of a case, or that of a log."""
+    tier = about.get("tier", "")
+    return f"{tier[:1]}: {tier}" if tier not in {"", *Tier} else ", ".join(Tier)
 
 
 def _far(row: Row) -> tuple[int, float]:
@@ -139,8 +148,8 @@ def _run(trace: Trace) -> dict[str, Any]:
     run = trace.run
     settings = trace.about.get("settings", {})
     return {
-        "who": label(trace), "outcome": f"{run.outcome.value} {run.message}".strip(), "steps": run.steps,
-        "events": len(run.events), "wall_ms": 1e3 * run.wall_s if run.wall_s else None,
+        "who": label(trace), "called": called(trace), "outcome": f"{run.outcome.value} {run.message}".strip(),
+        "steps": run.steps, "events": len(run.events), "wall_ms": 1e3 * run.wall_s if run.wall_s else None,
         "control_ms": 1e3 * run.control_s if run.control_s else None, "samples": len(run.t),
         "settings": ", ".join(
             f"{k} = {v:.6g}" if isinstance(v, float) else f"{k} = {v}" for k, v in settings.items() if k != "samples"
@@ -148,7 +157,10 @@ def _run(trace: Trace) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _audit(found: Results, case: CaseFiles) -> Section:
+def _audit(found: Results, case: CaseFiles) -> list[Section]:
+    """What reached the engines; nothing where a log is what they are compared with."""
+    if case.about.get("tier", "") not in {"", *Tier}:
+        return []
     said = {row["who"]: row["verdict"] for row in found.rows.get(case.label, ()) if row["metric"] == "audit"}
     told = [
         row | {"who": who, "verdict": "within" if row["same"] else said.get(who, "outside")}
@@ -163,15 +175,21 @@ def _audit(found: Results, case: CaseFiles) -> Section:
         else f"{AUDIT_TEXT} Nothing was audited."
     )
     table = Table(title="Parity audit", columns=AUDIT, rows=told, folded=not failed)
-    return Section(name="audit", title="Parity audit", text=text, tables=(table,))
+    return [Section(name="audit", title="Parity audit", text=text, tables=(table,))]
 
 
 def provenance(told: Mapping[str, Any]) -> Section:
     """What results depend on besides their numbers."""
-    rows = [{"key": key, "value": _words(value)} for key, value in told.items() if value not in (None, {}, "")]
+    rows = [{"key": key, "value": text} for key, value in told.items() for key, text in _entries(key, value)]
     table = Table(title="Provenance", columns=columns(key="What", value=("Value", Kind.CODE)), rows=rows)
     return Section(name="provenance", title="Provenance", tables=(table,))
 
 
-def _words(value: Any) -> str:
-    return ", ".join(f"{k} {v}" for k, v in value.items()) if isinstance(value, Mapping) else str(value)
+def _entries(key: str, value: Any) -> list[tuple[str, str]]:
+    """Return the lines of an entry: names with their versions are one, all else of a mapping is a line each."""
+    if isinstance(value, Mapping) and not all(isinstance(each, str) for each in value.values()):
+        return [line for name, each in value.items() for line in _entries(f"{key}: {name}", each)]
+    if isinstance(value, Mapping):
+        return [(key, ", ".join(f"{name} {each}" for name, each in value.items()))] if value else []
+    text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+    return [(key, text)] if text and value is not None and value is not False else []

@@ -8,7 +8,7 @@ from math import isnan
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Mode
+from crossbody.cases import Mode, Tier
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import WAYS
 from crossbody.reports.figures.section import Figure, Plot
@@ -37,6 +37,8 @@ IDLE = 1e-9
 """Part of the largest force of a case, or of the force that its energy makes over its way, below which
 a contact carries none: tolerances of runs and rounding leave that."""
 REMAINDERS = 0.02  # share of the steps that may be what is left before an event, or a first try: not drawn
+EPS = float(np.finfo(float).eps)
+SENSED = 1e-6  # part of the largest value that no sensor of a rig resolves
 ROUNDING = 1e-17  # depth below which there is none, m
 
 
@@ -65,10 +67,15 @@ def points_for(traces: Sequence[Trace], room: float) -> int:
     return int(np.clip(room / (SAMPLE * lines), FEWEST, POINTS))
 
 
-def floor_of(truth: Floats) -> float:
-    """Below this a difference is rounding: the largest value times 2.2e-16, down to a power of ten."""
+def floor_of(truth: Floats, part: float = EPS) -> float:
+    """Below this a difference is rounding, or noise: that part of the largest value, down to a power of ten."""
     largest = float(np.max(np.abs(truth[np.isfinite(truth)]), initial=0.0))
-    return float(10.0 ** np.floor(np.log10(largest * np.finfo(float).eps))) if largest > 0.0 else 1e-17
+    return float(10.0 ** np.floor(np.log10(largest * part))) if largest > 0.0 else 1e-17
+
+
+def of_log(traces: Sequence[Trace]) -> bool:
+    """Whether the lead is a log, which is no truth: it resolves what its sensors do."""
+    return traces[0].about.get("tier", "") not in {"", *Tier}
 
 
 def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
@@ -145,10 +152,12 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE,
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
     # One floor a unit, by the largest value in any run: a coordinate that stays at 0 has its neighbours' size.
     sizes = _largest((trace.run.q for trace in traces), len(names))
-    floors = {unit: floor_of(sizes[[k for k, (_, u) in enumerate(names) if u == unit]]) for _, unit in names}
+    part = SENSED if of_log(traces) else EPS
+    floors = {unit: floor_of(sizes[[k for k, (_, u) in enumerate(names) if u == unit]], part) for _, unit in names}
     shown = which or sorted(farthest(traces)[:MOST_SIGNALS])
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
-    sheet = Sheet(rows, "Coordinates, and |difference from the truth|, impacts matched", points, group=2)
+    title = "Coordinates, and |measured minus predicted|" if of_log(traces) else MATCHED
+    sheet = Sheet(rows, title, points, group=2)
     for i, trace in enumerate(traces):
         t, q = filled(trace.run, trace.quaternions)
         for place, k in enumerate(shown):
@@ -182,8 +191,8 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
     """Multipliers, their cumulative impulse, and its difference to the truth's."""
     contacts = traces[0].about["contacts"]
     shown = which or sorted(loaded(traces)[:MOST_SIGNALS])
-    each = ("lam {}\n[{}]", "impulse\n[{1} s]", "|error|\n[{1} s]")
-    rows = [text.format(contacts[k], force_unit(traces, k)) for k in shown for text in each]
+    each = ("{2} {0}\n[{1}]", "impulse\n[{1} s]", "|error|\n[{1} s]")
+    rows = [text.format(contacts[k], *force_kind(traces, k)) for k in shown for text in each]
     sheet = Sheet(rows, "Contact force, cumulative impulse and |its difference from the truth|", points, group=3)
     summed = [with_collisions(trace.run, trace.run.events) for trace in traces]
     total = float(np.nanmax(np.abs(summed[0]), initial=idle(traces[0].run) * float(traces[0].run.t[-1])))
@@ -202,7 +211,7 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
         if ends is not None:
             sheet.clip(3 * place, *ends)
             for who, size in far.items():
-                sheet.beyond(who, size, force_unit(traces, k), contacts[k])
+                sheet.beyond(who, size, force_kind(traces, k)[0], contacts[k])
         for limit, name in limits.get("lam_impulse_path", {}).items():
             sheet.limit(3 * place + 2, limit * total, name)
             sheet.band(3 * place + 1, limit * total, name)
@@ -221,9 +230,10 @@ def _true_impulse(trace: Trace, lead: Trace) -> Floats | None:
     return found
 
 
-def force_unit(traces: Sequence[Trace], k: int) -> str:
-    """Unit of a contact's multiplier: a torque where its gap is an angle."""
-    return "N m" if traces[0].about["contacts"][k] in traces[0].about.get("turning", ()) else "N"
+def force_kind(traces: Sequence[Trace], k: int) -> tuple[str, str]:
+    """Unit of a contact's multiplier and what it is: a torque where its gap is an angle."""
+    turns = traces[0].about["contacts"][k] in traces[0].about.get("turning", ())
+    return ("N m", "torque") if turns else ("N", "force")
 
 
 def carrying(traces: Sequence[Trace], least: float = 0.0) -> list[int]:
@@ -360,7 +370,7 @@ def _names(traces: Sequence[Trace], noun: str) -> list[str]:
 
 def note(name: str, traces: Sequence[Trace]) -> str:
     """What the reader of a figure must know."""
-    told = [NOTES.get(name, "")]
+    told = [LOG_NOTE if name == "motion" and of_log(traces) else NOTES.get(name, "")]
     if name in SIGNALS:
         noun, order, _ = SIGNALS[name]
         names, found = _names(traces, noun), order(traces)
@@ -371,7 +381,7 @@ def note(name: str, traces: Sequence[Trace]) -> str:
     if name == "energy" and (
         without := [label(one) for one in traces if one.run.ledger is None and label(one) != TRUTH]
     ):
-        told.append(f"Without an account of work, so that only their total energy is drawn: {', '.join(without)}.")
+        told.append(f"Only the total energy is drawn of engines without an account of work: {', '.join(without)}.")
     if name == "modes":
         told += [*_same(traces), *_throughout(traces)]
     return " ".join(filter(None, told))
@@ -404,6 +414,11 @@ def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
         yield f"{mode} throughout, in every engine: {few(_normals(names))}."
 
 
+MATCHED = "Coordinates, and |difference from the truth|, impacts matched"
+LOG_NOTE = (
+    "Every window starts from the measured state, where the difference is zero. Differences below a millionth of the "
+    "largest value of that unit are cut off."
+)
 NOTES = {
     "motion": (
         "Impacts are matched first, and the arcs between them compared; the errors of their times are the "

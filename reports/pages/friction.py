@@ -13,7 +13,7 @@ from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import LINE, coded, label, plain, style
-from crossbody.reports.pages.figures import carrying, force_unit, robust
+from crossbody.reports.pages.figures import carrying, force_kind, robust
 from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
@@ -28,9 +28,9 @@ OVER_DEPTH = (
 DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
 MOST = 1000  # points of one engine's line
 TEXT = (
-    "Of one contact. The force of a sticking contact is inside the cone, that of a sliding one on its "
-    "edge; outside, it violates Coulomb's law. In the plane of the contact, the friction force relative "
-    "to mu lam is a point of the unit disc; a sliding contact has it opposite to the slip."
+    "Friction of one contact is bounded by mu times the normal force. The force of a sticking contact is inside "
+    "this cone, that of a sliding one on its edge; outside, it violates Coulomb's law. In the plane of the "
+    "contact, friction relative to its bound is a point of the unit disc, opposite to the slip if the contact slides."
 )
 
 
@@ -59,13 +59,13 @@ def _loop(traces: Sequence[Trace], k: int, most: int, name: str) -> Plot | None:
     lines = [line for i, trace in enumerate(traces) if (line := _over_depth(trace, i, k, most))]
     contact = traces[0].about["contacts"][k]
     ends, far = robust(traces, k)
-    unit = force_unit(traces, k)
+    unit, kind = force_kind(traces, k)
     off = off_scale({who: [(size, unit, contact)] for who, size in far.items()})
     title = f"Force over depth, contact {plain(contact)}{off and f'. Off scale: {plain(off)}'}"
     layout = {
         "title": {"text": title}, "height": 420, "showlegend": False,
         "xaxis": {"title": {"text": f"depth [{'m' if unit == 'N' else 'rad'}]"}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": f"lam [{unit}]"}, "exponentformat": "power", "rangemode": "tozero"}
+        "yaxis": {"title": {"text": f"{kind} [{unit}]"}, "exponentformat": "power", "rangemode": "tozero"}
         | ({"range": list(ends)} if ends else {}),
     }  # fmt: skip
     return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact) if lines else None
@@ -118,10 +118,10 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
     plane = [_line(one, j, forces[j][2], most) for j, one in enumerate(traces)]
     top = max(float(np.nanmax(rows[:, 0], initial=0.0)) for rows, *_ in forces)
     plots = [
-        _plot("cone", i, f"Friction over normal force, {name}. Dashed: mu lam, mu = {contact.friction:g}", cone,
-              ("lam [N]", "|friction| [N]"), [_edge(contact.friction, top)], name),
-        _plot("plane", i, f"Friction over mu lam in the plane, {name}. Dashed: the cone's edge", plane,
-              ("friction t1 / (mu lam)", "friction t2 / (mu lam)"), [DISC], name),
+        _plot("cone", i, f"Friction over normal force, {name}. Dashed: the bound, mu = {contact.friction:g}", cone,
+              ("normal force [N]", "|friction| [N]"), [_edge(contact.friction, top)], name),
+        _plot("plane", i, f"Friction over its bound in the plane, {name}. Dashed: the cone's edge", plane,
+              ("friction t1 / bound", "friction t2 / bound"), [DISC], name),
     ]  # fmt: skip
     if contact.first.type == "plane":
         slips = [_line(trace, j, _slipping(trace, contact, place), most) for j, trace in enumerate(traces)]

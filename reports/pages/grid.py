@@ -152,7 +152,7 @@ def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, floa
     together = [whole(label, page, who, mine[who], None) for who in engines]
     costs = [_cost(walls.get(who), least) for who in engines]
     return [
-        Line(text="all judged", small="error of position", cells=together),
+        Line(text="all judged", small="error of position" if "position" in by(rows, "metric") else "", cells=together),
         Line(text="run time", small="relative to the fastest", cells=costs),
         *_metrics(rows, mine, engines, page),
     ]

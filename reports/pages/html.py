@@ -44,6 +44,7 @@ SIGNS = {
 }  # fmt: skip
 """A verdict is shown by sign and word besides its colour."""
 MOST = 2000  # rows of a table that a page shows; the file beside it has all
+UNFOLDED = 500  # characters of a text in a table that are shown at once
 THEME = (
     'try { const kept = localStorage.getItem("crossbody-theme"); '
     "if (kept) document.documentElement.dataset.theme = kept; } catch { /* a browser may refuse storage to a file */ }"
@@ -51,6 +52,7 @@ THEME = (
 """Runs before anything is drawn, so that a page does not flash."""
 
 
+WRITTEN_OUT = 1e4  # from here on four digits would have an exponent, which they need from a million on
 UNITLESS = re.compile(r"(<br>|\s)*\[1\]$")  # what a number without a unit would have for one
 
 
@@ -172,7 +174,7 @@ def environment() -> Environment:
         "text_packed": packed_text,
         "value_packed": packed_value,
     }
-    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST}
+    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST, "UNFOLDED": UNFOLDED}
     return made
 
 
@@ -264,4 +266,6 @@ def number(value: Any) -> str:
     """A number for a table: a count in full, any other with four digits, a dash where there is none."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
+    if isinstance(value, float) and WRITTEN_OUT <= abs(value) < 100.0 * WRITTEN_OUT:
+        return f"{float(f'{value:.4g}'):.0f}"
     return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import coded, label, level, number, plain, style
+from crossbody.reports.figures.styles import called, coded, label, level, number, plain, style
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep
@@ -86,7 +86,7 @@ class Sheet:
         look = style(trace, i)
         line = {
             "type": "scatter", "x": coded(_times(t[at])),
-            "name": plain(label(trace)), "meta": label(trace), "mode": "lines",
+            "name": plain(called(trace)), "meta": label(trace), "mode": "lines",
             "line": {key: look[key] for key in ("color", "dash", "width")} | more,
             "opacity": 0.65 if label(trace) == TRUTH else 1.0,
         }  # fmt: skip

@@ -119,7 +119,7 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     alone = studied if _leads(found) else []
     for page in index_pages(found):
         if page.name == INDEX:
-            title = ", ".join(study.title for study in alone) if alone and not found.cases else page.title
+            title = " · ".join(study.title for study in alone) if alone and not found.cases else page.title
             first = [section for study in alone for section in study.sections]
             page = replace(page, title=title, sections=[*first, *page.sections])
         yield page

@@ -31,8 +31,8 @@ BENCH = (
 )
 COLUMNS = columns(
     who="Engine", worst=("Worst", Kind.VERDICT), within=("Cases trusted", Kind.NUMBER),
-    expected=("with known deviations", Kind.NUMBER), outside=("outside", Kind.NUMBER),
-    skipped=("not run", Kind.NUMBER), error=("Error, median", Kind.NUMBER),
+    expected=("Cases with known deviations", Kind.NUMBER), outside=("Cases outside", Kind.NUMBER),
+    skipped=("Cases not run", Kind.NUMBER), error=("Error, median", Kind.NUMBER),
     most=("Error, worst", Kind.NUMBER), cost=("Run time over the reference's, median", Kind.NUMBER),
     ratio=("At its best error", Kind.NUMBER),
 )  # fmt: skip

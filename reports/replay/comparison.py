@@ -27,6 +27,7 @@ WORSE = Limit(
 WHOLE = 100.0  # what a share in percent would be at best
 FAILED = "A run that ends early predicts nothing after its end."
 MEASURED, SYNTHETIC = "measurement", "SYNTHETIC, no measurement"
+CALLED = "measured"  # what plots call a log, which stands where other cases have their truth
 RESIDUALS = ("who", "channel", "unit", "window", "t", "measured", "value")
 
 
@@ -236,7 +237,8 @@ def save_motions(folder: Path, found: Comparison) -> None:
     """The measurement as the truth, and every prediction beside it, into an empty folder."""
     measured = found.measurement()
     origin = found.log.provenance
-    source = {"tier": tier(found.log), "source": f"{origin.file}. {origin.about}".strip()}
+    told = ". ".join(filter(None, (origin.file, origin.about)))
+    source = {"tier": tier(found.log), "source": told, "called": CALLED}
     save(folder / "0000.parquet", Trace(about=_about(found, TRUTH, "") | source, run=measured))
     for i, prediction in enumerate(found.predictions, start=1):
         about = _about(found, prediction.engine, prediction.profile) | {"settings": dict(prediction.settings)}

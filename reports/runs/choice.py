@@ -125,7 +125,7 @@ def check_known(settings: Mapping[str, Value], ran: Sequence[tuple[str, str, Map
 
     Args:
         settings: asked for.
-        ran: engine, profile and settings of those that can run.
+        ran: engine, profile and settings that it offers, of those that can run.
 
     Raises:
         UnknownName: for one that none of those who are meant has.
@@ -151,6 +151,6 @@ def check_asked(settings: Mapping[str, Value], wanted: Sequence[Pick]) -> None:
         name, profile = parse_engine(who)
         known = {pick.engine for pick in wanted}
         if name not in known:
-            raise UnknownName("engine (of a setting)", name, known)
+            raise UnknownName("engine in this run", name, known)
         if profile is not None and profile not in engines.load(name).profiles:
             raise UnknownName(f"profile of {name}", profile, engines.load(name).profiles)

@@ -223,9 +223,9 @@ def _too_dear(pick: Pick, cost: str) -> str:
 def prepare(case: Case, pick: Pick, asked: Mapping[str, Value]) -> engines.Run:
     """A prepared run, with those of the asked settings that the engine has."""
     engine = engines.load(pick.engine)
-    prepared = _checked(pick, engine.prepare(case, pick.profile))
-    own = {key: value for key, value in asked.items() if key in prepared.settings}
-    return _checked(pick, engine.prepare(case, pick.profile, **own)) if own else prepared
+    offered = engine.offered(case, pick.profile) if asked else {}
+    own = {key: value for key, value in asked.items() if key in offered}
+    return _checked(pick, engine.prepare(case, pick.profile, **own))
 
 
 def _of_engine(pick: Pick, method: str, value: object, kind: type[_Kind], wanted: str) -> _Kind:

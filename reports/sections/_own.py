@@ -124,8 +124,8 @@ def _conformance(out: Path) -> tuple[Section, ...]:
     across = columns(feature="Feature", **{name: (f"{name} {versions[name]}", Kind.VERDICT) for name in engines})
     off = rows[~rows["verdict"].isin(["ok", "-"])]
     tables = (
+        _table("What is not ok", words.DETAILS, off, "conformance"),
         Table(title="Features", columns=across, rows=[{name: "" for name in engines} | row for row in wide]),
-        _table("What is not ok", words.DETAILS, off, "conformance", folded=True),
     )
     title = STUDIES["conformance"].TITLE
     return (Section(name="conformance", title=title, text=words.CONFORMANCE_TEXT, tables=tables),)

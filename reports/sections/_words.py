@@ -16,7 +16,7 @@ THROUGHPUT_TEXT = (
 ANALYSIS_TEXT = (
     "Linear models about the equilibria of the case, in the named modes, by exact derivatives of "
     "the equations. Rows that hold are eliminated, so that their law adds no poles, unless the law "
-    "itself is studied. Where a contact slides, nothing stands: the model is that of the equations "
+    "itself is studied. Where a contact slides, nothing is at rest, and the equations are linearised "
     "about the motion. A pole with a positive real part grows, one with a negative real part "
     "decays. Linear stability does not show that an equilibrium is reached. Engines are judged by "
     "their largest difference from the reference: in the derivatives of the accelerations, each "
@@ -111,7 +111,7 @@ GAPS_TEXT = (
 )
 GAPS = columns(
     n=("Balls", Kind.NUMBER), who="Engine", machine="Law or rule", most=("Most energy created", Kind.NUMBER),
-    at_s=("at s", Kind.NUMBER), at_touch="Touching, nearest to", ideal_from=("Ideal from s", Kind.NUMBER),
+    at_s=("At gap s", Kind.NUMBER), at_touch="Touching, nearest to", ideal_from=("Ideal from s", Kind.NUMBER),
     failed=("Failed", Kind.NUMBER), why=("Comment", Kind.LONG),
 )  # fmt: skip
 STABILITY_TEXT = (

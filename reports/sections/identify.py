@@ -14,14 +14,14 @@ from crossbody.reports.runs.study import read_json
 TITLE = "Identification"
 ESTIMATES = columns(
     name="Parameter", value=("Estimate", Kind.NUMBER),
-    half=("± (95 %)", Kind.NUMBER), low=("From", Kind.NUMBER), high=("to", Kind.NUMBER),
+    half=("± (95 %)", Kind.NUMBER), low=("95 % from", Kind.NUMBER), high=("95 % to", Kind.NUMBER),
     unit="Unit", start=("Start", Kind.NUMBER), identifiable="Identifiable",
     first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
 )  # fmt: skip
 HELD = columns(
-    error="Error", means="Meaning", unit="Unit", fitted_before=("Fitted windows, start", Kind.NUMBER),
-    fitted_after=("estimate", Kind.NUMBER),
-    held_before=("Held-out windows, start", Kind.NUMBER), held_after=("estimate", Kind.NUMBER),
+    error="Error", means=("Meaning", Kind.LONG), unit="Unit", fitted_before=("Fitted windows, start", Kind.NUMBER),
+    fitted_after=("Fitted windows, estimate", Kind.NUMBER),
+    held_before=("Held-out windows, start", Kind.NUMBER), held_after=("Held-out windows, estimate", Kind.NUMBER),
     change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 MEANS = {

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns, records
-from crossbody.reports.layout import unit_text
+from crossbody.reports.layout import unit_text, valid
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Replay"
@@ -20,9 +20,8 @@ TEXT = (
     "deviations of the measurement noise; windows held out of an identification are shaded."
 )
 METRICS = columns(
-    who="Engine", metric="Metric", means="Meaning", channel="Channel", value=("Value", Kind.NUMBER), unit="Unit",
-    expected=("At best", Kind.NUMBER), limit=("May be off by", Kind.NUMBER),
-    verdict=("Verdict", Kind.VERDICT),
+    who="Engine", metric="Metric", means=("Meaning", Kind.LONG), channel="Channel",
+    value=("Value", Kind.NUMBER), unit="Unit", valid="Valid", verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
 MEANS = {
     "fit": "share of the measured motion that is explained, 100 at best",
@@ -57,7 +56,11 @@ def sections(out: Path) -> tuple[Section, ...]:
         pd.DataFrame(read_json(out / f"{name}.json")["rows"])
         for name in ("replay", "findings", "residuals", "correlations")
     )
-    metrics = metrics.reindex(columns=[column.key for column in METRICS])  # an earlier run judged nothing
+    metrics = metrics.reindex(
+        columns=[*(column.key for column in METRICS), "expected", "limit"]
+    )  # none was judged once
+    numbers = metrics[["expected", "limit"]].astype(float)
+    metrics["valid"] = [valid(*pair) for pair in zip(numbers["expected"], numbers["limit"], strict=True)]
     metrics["means"] = metrics["metric"].map(lambda name: MEANS.get(name.partition("_")[0], ""))
     metrics["unit"] = metrics["unit"].map(lambda unit: unit_text(unit, "{}"))
     told = read_json(out / "replay.json")["provenance"]
@@ -96,7 +99,7 @@ def judged(metrics: pd.DataFrame) -> str:
         return "Nothing is judged, since no limit was given (for example --limit fit=90)."
     off = rows[rows["verdict"] == "outside"]
     those = [
-        f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g}{unit_text(str(row.unit))}"
+        f"{row.who} {row.metric} {row.channel}".strip() + f" = {row.value:.4g}{unit_text(str(row.unit))} ({row.valid})"
         for row in off.itertuples()
     ]
     return f"{len(rows) - len(off)} of {len(rows)} limits are met." + (

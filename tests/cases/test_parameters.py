@@ -76,7 +76,7 @@ def test_a_case_and_its_variant_are_one_word_wherever_a_case_is_taken(name: str)
         assert cases.variants(both) == (variant,)
         assert cases.load(both).label == cases.load(name, variant).label == cases.load(both, variant).label == both
         assert [case.label for case in load_cases([both], None, {})] == [both]
-    with pytest.raises(UnknownName, match="variant of"):
+    with pytest.raises(UnknownName, match=f"no variant 'nope' of {name}"):
         cases.load(f"{name}:nope")
     with pytest.raises(InvalidValue, match="give one of them"):
         cases.load(both, "nope")

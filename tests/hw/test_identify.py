@@ -220,7 +220,7 @@ def test_a_maze_is_replayed_from_where_its_ball_was_seen() -> None:
 def test_wrong_use_is_one_sentence() -> None:
     log = swing(0.0, 0, seconds=2.5)
     for free, more, error, words in (
-        (["mass"], {}, UnknownName, "no parameter of double_pendulum 'mass'"),
+        (["mass"], {}, UnknownName, "no parameter 'mass' of double_pendulum"),
         ([], {}, InvalidValue, "at least one"),
         (["k1", "k1"], {}, InvalidValue, "none twice"),
         (["k1"], {"hold": 1}, InvalidValue, "hold is"),

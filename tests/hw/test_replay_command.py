@@ -116,7 +116,7 @@ def test_a_synthetic_log_is_called_so_everywhere(tmp_path: Path, capsys: pytest.
     [
         (["-m", "triple_pendulum", "--columns", "multiarm_double"], "There is no model 'triple_pendulum'"),
         ([*MODEL, "-e", "bullet"], "There is no engine 'bullet'"),
-        ([*MODEL, "--set", "mass=1"], "There is no parameter of double_pendulum 'mass'"),
+        ([*MODEL, "--set", "mass=1"], "There is no parameter 'mass' of double_pendulum"),
         ([*MODEL, "--restart", "100"], "no window of 100 s"),
         ([*MODEL, "--closed-loop"], "has no controller"),
     ],
@@ -207,7 +207,7 @@ def test_a_lower_bound_is_told_as_it_was_given(
     assert code(*asked, "--out", tmp_path) == 1
     told = capsys.readouterr().out
     assert re.search(r"outside: reference:compiled fit_th1 is [\d.]+ %, valid: at least 99\.9995\. ", told), told
-    assert re.search(r"outside: reference:compiled rmse_th1 is [\d.e-]+ rad, limit 1e-09\. ", told)
+    assert re.search(r"outside: reference:compiled rmse_th1 is [\d.e-]+ rad, valid: at most 1e-09\. ", told)
 
 
 def test_what_was_identified_is_replayed_as_replay_does(

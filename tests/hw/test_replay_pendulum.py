@@ -100,7 +100,7 @@ def test_a_log_without_what_the_model_needs_is_refused() -> None:
         hw.replay(log, "single_pendulum", restart=-1.0)
     with pytest.raises(ValueError, match="has no controller"):
         hw.replay(log, "single_pendulum", kind="closed_loop")
-    with pytest.raises(hw_error(), match="There is no parameter of single_pendulum 'mass'"):
+    with pytest.raises(hw_error(), match="There is no parameter 'mass' of single_pendulum"):
         hw.replay(log, "single_pendulum", parameters={"mass": 1.0})
 
 

@@ -475,7 +475,7 @@ def test_a_file_takes_a_control_from_python_or_by_name(files: Path) -> None:
     [
         (["hold.py:wrong"], "gives an array of shape (2,); valid: 1 real numbers, of m."),
         (["hold.py"], "FILE.py:NAME"),
-        (["hold.py:None2"], "no name in hold.py 'None2'"), (["absent.py:f"], "no controller file"),
+        (["hold.py:None2"], "no name 'None2' in hold.py"), (["absent.py:f"], "no controller file"),
         (["hold.py:np"], "must be a callable"), (["hold.py:Hold", "--ctrl", "u.csv"], "valid: one of them"),
         (["hold.py:Hold", "--tick", "0"], "tick is 0"), (["hold.py:Hold", "--tick", "nan"], "tick is nan"),
     ],

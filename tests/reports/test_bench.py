@@ -13,12 +13,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given, settings
+from unpacked import numbers
 
 from crossbody import cases, engines
 from crossbody.cases import InvalidValue, Mode, Outcome, OutputError, Tier, Trajectory
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes
 from crossbody.reports.bench.errors import errors, hermite
+from crossbody.reports.bench.figure import work_precision
 from crossbody.reports.bench.headline import REFERENCE, headline
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.measure import COLUMNS, bench, joined
@@ -469,3 +471,20 @@ def test_what_was_ended_or_skipped_is_not_measured(monkeypatch: pytest.MonkeyPat
     picks = [Pick(engine=name, profile="p", skipped="It is not there." * (name == "skipped")) for name in named]
     assert list(measure._rungs(case, picks, Effort(), lambda _: None, 1.0)) == ["one", "two"]
     assert asked == ["one", "unable", "two"]
+
+
+def test_no_line_leads_to_a_rung_that_failed(rows: pd.DataFrame) -> None:
+    """It is a cross at the edge, without a label; thirteen engines look different."""
+    many = [rows.assign(engine=f"engine{k}") for k in range(4)]
+    drawn = work_precision(pd.concat([rows, *many], ignore_index=True))["data"]
+    lines = [line for line in drawn if "lines" in line["mode"]]
+    crosses = [line for line in drawn if line["marker"]["symbol"] == "x"]
+    assert len(lines) + len(crosses) == len(drawn)
+    assert all("lines" not in line["mode"] and "text" not in line for line in crosses)
+    assert len({(line["line"]["color"], line["line"]["dash"]) for line in lines}) == len(lines) >= 10
+    shown = [line["name"] for line in drawn if line.get("showlegend", True)]
+    assert sorted(shown) == sorted({line["name"] for line in drawn}), "each engine is once in the legend"
+    for line in crosses:
+        edge = set(numbers(line["x"]))
+        assert len(edge) == 1
+        assert edge.pop() > rows["error"][np.isfinite(rows["error"])].max()

@@ -273,7 +273,7 @@ def test_a_setting_is_given_to_whom_it_names(given: tuple[str, ...], steps: Mapp
     ("setting", "words"),
     [
         ("fack.dt=1", "Did you mean 'fake'"), ("fake:exakt.dt=1", "Did you mean 'exact'"),
-        ("fake.dd=1", "no setting of fake 'dd'"),
+        ("fake.dd=1", "no setting 'dd' of fake"),
     ],
 )  # fmt: skip
 def test_a_setting_of_nobody_is_a_sentence(setting: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -287,6 +287,17 @@ def test_a_setting_that_an_engine_refuses_is_told_before_any_run(monkeypatch: py
     assert call(*LINEAR, "-e", "fake:exact", "--set-engine", "fake.dd=1") == 2
 
 
+def test_a_folder_of_others_is_refused_before_a_case_is_built(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Who compiles first waits for that sentence."""
+    Path("mine").mkdir()
+    Path("mine/notes.txt").write_text("mine")
+    monkeypatch.setattr(cases, "load", lambda *_, **__: pytest.fail("a case was built"))
+    assert call(*LINEAR, "--out", "mine") == 2
+    assert "holds files that crossbody did not write" in capsys.readouterr().err
+
+
 def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("-e", "fake", "-e", "absent", "--set", "t_end=2", "--set-engine", "fake:off.dt=4e-3", "--dry-run")
     assert call(*LINEAR, *words) == 0
@@ -296,6 +307,17 @@ def test_a_dry_run_tells_what_would_be_run_and_writes_nothing(capsys: pytest.Cap
     assert "fake:off  dt=0.004" in said
     assert "absent:*  skipped: Engine 'absent' needs" in said
     assert list(Path.cwd().iterdir()) == []
+
+
+def test_a_dry_run_says_once_what_variants_share(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(FakeEngine, "planned", lambda *_, **settings: {"dt": 1e-3} | settings)
+    assert call("run", "bouncing_ball", "-e", "fake:exact", "-e", "fake:off", "--dry-run") == 0
+    said = capsys.readouterr().out
+    assert said.count("mass 1") == said.count("fake:exact  dt=0.001") == said.count("fake:off  ") == 1
+    assert "  parameters: a0 10000, a2 0; all others as for bouncing_ball:listing\n" in said
+    assert said.count("  all engines as for bouncing_ball:listing\n") == len(cases.variants("bouncing_ball")) - 1
 
 
 def test_a_plan_as_json_says_what_the_plan_says(capsys: pytest.CaptureFixture[str]) -> None:

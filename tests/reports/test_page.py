@@ -533,6 +533,22 @@ def test_a_page_needs_no_engine(out: Path) -> None:
     assert said.strip() == "[]"
 
 
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (36834.6, "36830"),
+        (-12345.0, "-12340"),
+        (1.5e6, "1.5e+06"),
+        (9999.0, "9999"),
+        (1e-5, "1e-05"),
+        (-0.0, "0"),
+        (7, "7"),
+    ],
+)
+def test_four_digits_have_an_exponent_where_they_need_one(value: float, said: str) -> None:
+    assert html.number(value) == said
+
+
 def test_a_page_of_given_sections() -> None:
     rows = [{"a": HOSTILE, "b": 1 / 3}, {"a": "x", "b": float("nan")}]
     given = Table(title="Numbers", columns=columns(a="A", b=("B [m]", Kind.NUMBER)), rows=rows)
@@ -544,6 +560,16 @@ def test_a_page_of_given_sections() -> None:
     assert HOSTILE not in text
     (drawn,) = re.findall(r'<script type="text/plain" data-plot="[^"]+">(.*?)</script>', text, re.DOTALL)
     assert value_of(drawn)["data"][0]["name"] == HOSTILE
+
+
+def test_a_long_text_is_folded_and_a_short_one_keeps_its_lines() -> None:
+    rows = [{"a": "one\ntwo\n"}, {"a": "0\n1\n" * 500}]
+    given = Table(title="Files", columns=columns(a=("A", Kind.CODE)), rows=rows)
+    text = html.render(
+        [Page(name="some", title="Some", sections=[Section(name="s", title="S", tables=(given,))])], (), ""
+    )
+    assert '<td class="code"><code>one\ntwo</code></td>' in text
+    assert '<td class="code"><details><summary>1999 characters</summary><code>0\n1\n' in text
 
 
 def test_a_column_without_a_value_is_left_out() -> None:

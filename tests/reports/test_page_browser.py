@@ -398,11 +398,15 @@ CROSSED = """[...document.querySelectorAll('.plot')].flatMap((plot) => {
     const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
     const titles = boxes('[class*="g-y"] text');
     if (titles.some((one, i) => titles.slice(0, i).some((two) => meet(one, two)))) return [plot.id];
+    const heads = boxes('.annotation text');
+    if (heads.some((one, i) => heads.slice(0, i).some((two) => meet(one, two)))) return [plot.id];
+    const legends = boxes('.legend .bg'), under = [...boxes('[class*="g-x"] text'), ...boxes('.xtick text')];
+    if (legends.some((legend) => legend.width && under.some((text) => meet(legend, text)))) return [plot.id];
     const over = (axis) => boxes(`[class*="g-${axis}"] text`).some(
         (title) => boxes(`.${axis}tick text`).some((tick) => meet(title, tick)));
     return ['x', 'y'].some(over) ? [plot.id] : [];
 })"""
-"""Plots where the title of an axis lies over another one or over the labels of its ticks."""
+"""Plots where a title lies over another one or over the labels of ticks, or a legend over either."""
 
 
 def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[str]:

@@ -93,7 +93,7 @@ def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> Non
 
     bears, idles = wide(run.lam), wide(0.0 * run.lam)
     titles = [axis["title"]["text"] for key, axis in force([bears])["layout"].items() if key.startswith("yaxis")]
-    assert [text.partition("<br>")[0] for text in titles] == ["lam floor", "impulse"]
+    assert [text.partition("<br>")[0] for text in titles] == ["force floor", "impulse"]
     assert note("force", [bears]).endswith("Without force in every run: wall.")
     assert (bool(plots("force", [bears])), bool(plots("force", [idles]))) == (True, False)
 
@@ -133,11 +133,11 @@ def test_a_bound_of_an_angle_pushes_with_a_torque(tmp_path: Path) -> None:
     result = run_case(case, [Pick(engine="reference", profile="compiled")], refine=False)
     study.write(tmp_path, [result], study.judge([result], {case.label: ""}), {"command": "", "time": ""})
     traces = [load_trace(path) for path in sorted((tmp_path / "traces").rglob("*.parquet"))]
-    assert "lam hinge high<br>[N m]" in axis_titles(force(traces))
+    assert "torque hinge high<br>[N m]" in axis_titles(force(traces))
     assert "impulse<br>[N m s]" in axis_titles(force(traces))
     assert "depth hinge high<br>[rad]" in axis_titles(penetration(traces))
     (section,) = hysteresis(traces)
-    assert axis_titles(section.plots[0].figure) == ["lam [N m]"]
+    assert axis_titles(section.plots[0].figure) == ["torque [N m]"]
 
 
 def test_a_contact_above_its_surface_has_no_depth_and_its_line_goes_on(run: Trajectory) -> None:
@@ -184,7 +184,7 @@ def test_tangential_rows_of_named_contacts_are_not_named(run: Trajectory) -> Non
 
 def test_an_engine_without_an_account_is_named(run: Trajectory) -> None:
     told = note("energy", [trace(run), trace(replace(run, ledger=None), "fake")])
-    assert told.endswith("only their total energy is drawn: fake:p.")
+    assert told.endswith("without an account of work: fake:p.")
     assert note("energy", [trace(run)]) == ""
 
 
@@ -207,7 +207,7 @@ def many(run: Trajectory, seed: int) -> list[Trace]:
 
 
 @pytest.mark.parametrize("seed", range(10))
-@pytest.mark.parametrize(("name", "axis"), [("motion", "x"), ("force", "lam c")])
+@pytest.mark.parametrize(("name", "axis"), [("motion", "x"), ("force", "force c")])
 def test_what_matters_most_is_seen_first_and_nothing_that_is_drawn_is_lost(
     run: Trajectory, name: str, axis: str, seed: int
 ) -> None:
@@ -255,7 +255,7 @@ def test_where_no_force_of_the_truth_is_known_no_error_of_an_impulse_is_drawn(ru
     blind = replace(run, lam=np.full_like(run.lam, np.nan), events=())
     lead = replace(trace(blind), truth=None)
     drawn = force([lead, Trace(about=lead.about | {"engine": "seeing"}, run=run, truth=blind)])
-    assert [text.partition("<br>")[0] for text in axis_titles(drawn)] == ["lam floor", "impulse"]
+    assert [text.partition("<br>")[0] for text in axis_titles(drawn)] == ["force floor", "impulse"]
 
 
 @pytest.mark.parametrize("seed", range(4))

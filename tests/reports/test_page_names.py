@@ -285,6 +285,27 @@ def test_marks_that_are_near_have_names_apart(width: int, tmp_path: Path, browse
     assert browser.complaints() == []
 
 
+@pytest.mark.parametrize("other", [1.3e-9, 0.7e-9])
+def test_a_name_covers_no_mark_where_its_other_side_is_free(
+    other: float, tmp_path: Path, browser: chromium.Browser
+) -> None:
+    """A mark stands beside another one, on either side, at its height."""
+    marks = [
+        ("one:profile", 1e-9, 5.0),
+        ("two:profile", other, 5.0),
+        ("far:off", 1e-3, 500.0),
+        ("near:by", 1e-14, 0.05),
+    ]
+    drawn(tmp_path, precision.scatter(marks, {who: k for k, (who, *_) in enumerate(marks)}), browser)
+    ends = browser.js(
+        "Object.fromEntries([...document.querySelectorAll('.names text:not(.limit)')]"
+        ".map((text) => [text.textContent, text.getAttribute('text-anchor')]))"
+    )
+    left, right = ("one:profile", "two:profile") if other > 1e-9 else ("two:profile", "one:profile")
+    assert ends == {left: "end", right: "start", "far:off": "start", "near:by": "start"}
+    assert browser.js(OVERLAPS) == []
+
+
 def test_one_instant_is_at_one_place_in_all_figures(page: Path, browser: chromium.Browser) -> None:
     browser.open(page)
     browser.wait(DRAW)

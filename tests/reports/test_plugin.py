@@ -170,7 +170,7 @@ def test_baselines_are_written_when_asked_and_compared_else(
     ("arguments", "says"),
     [
         (("--crossbody-case", "bouncing_bal"), "*There is no case 'bouncing_bal'. Did you mean 'bouncing_ball'?*"),
-        (("--crossbody-case", "bouncing_ball:nope"), "*There is no variant of bouncing_ball 'nope'.*listing*"),
+        (("--crossbody-case", "bouncing_ball:nope"), "*There is no variant 'nope' of bouncing_ball.*listing*"),
         (("--crossbody-case", "gone/case.py"), "*There is no case file '*"),
         (("--crossbody-case", str(OWN), "--crossbody-engine", "nope"), "*There is no engine 'nope'.*reference*"),
     ],

@@ -95,7 +95,7 @@ def test_what_lacks_one_name_of_its_kind_is_told_which(
 def test_a_case_file_is_checked_as_a_plug_in_is(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for wrong, says in (
         ("VARIANTS = {}", "VARIANTS is {}; valid: "),
-        ("VARIANTS = {'right': {'nonsense': 1.0}}", "There is no parameter of mine:right 'nonsense'. Known: error, "),
+        ("VARIANTS = {'right': {'nonsense': 1.0}}", "There is no parameter 'nonsense' of mine:right. Known: error, "),
         ("def build(p): ...", "build is a function of (p); valid: a function of (variant, parameters)."),
     ):
         Path("mine.py").write_text(f"{GOOD['crossbody.cases']}\n{wrong}\n")

@@ -26,8 +26,9 @@
       at[last] = value;
     }
     for (const key of axes(out)) if (key[0] === "y") out[key] = { ...out[key], automargin: true }; // titles beside long ticks
+    out.legend = { ...out.legend, tracegroupgap: 0 };
     if (innerWidth < 600) {
-      out.margin = { ...out.margin, l: 58, r: 6, t: out.showlegend === false ? 10 : out.margin.t }; // no buttons there
+      out.margin = { ...out.margin, l: 58, r: 6, t: out.showlegend === false ? (out.annotations?.length ? 24 : 10) : out.margin.t }; // no buttons there
       out.font = { ...out.font, size: 10 };
       for (const key of axes(out)) {
         if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
@@ -146,10 +147,16 @@
       const inside = over.dataset.named === "marks";
       const lines = box.data.filter((line) => own(line) && (line.yaxis || "y") === key);
       const ends = lines.map((line) => [line, left(line, x, y)]).filter(([, at]) => at).sort(([, a], [, b]) => a[1] - b[1]);
+      const points = inside ? lines.flatMap((one) => [...one.x].map((at, i) => [x.d2p(at), y.d2p(one.y[i])])) : [];
+      const covered = (at, height, wide, side) => { // marks under a name on one side of its own; infinitely many where it has no room
+        const [from, to] = [at + 2 * side, at + side * (wide + ROOM)].sort((a, b) => a - b);
+        if (from < 0 || to - ROOM > x._length) return Infinity;
+        return points.filter(([px, py]) => px > from && px < to && Math.abs(py - height) < TALL - 3).length;
+      };
       spread(ends.map(([, at]) => at[1]), y._length).forEach((middle, k) => {
         const [{ title, wide, line, marker }, at] = ends[k];
         const { color } = line || marker;
-        const side = inside && at[0] + wide > x._length ? -1 : 1; // of a mark, what has room
+        const side = inside && covered(at[0], middle, wide, -1) < covered(at[0], middle, wide, 1) ? -1 : 1;
         const [there, height] = [inside ? x._offset + at[0] + side * ROOM : right + ROOM, y._offset + middle];
         const text = drawing("text", { x: there + 3 * side, y: height + 4, "text-anchor": side < 0 ? "end" : "start" }, title);
         if (inside) text.setAttribute("class", "inside");
@@ -205,6 +212,23 @@
     marks();
   });
 
+  // Columns of plots do not fit a narrow screen: there they stand below each other, each with its own title and ticks.
+  const stacked = (box, { layout }) => {
+    const pairs = axes(layout).filter((key) => key[0] === "x").map((key) => [layout[key], layout[`yaxis${(layout[key].anchor ?? "y").slice(1)}`]]);
+    if (box.clientWidth > 600 || !pairs.some(([x]) => x.domain?.[0] > 0)) return;
+    const over = ([x, y]) => (layout.annotations ?? []).filter((head) => head.xref === "paper" && Math.abs(head.y - y.domain[1]) < 1e-9
+      && x.domain[0] < head.x && head.x < x.domain[1]);
+    const heads = pairs.map(over);
+    const tall = layout.height / new Set(pairs.map(([, y]) => y.domain[1])).size;
+    layout.height = tall * pairs.length;
+    pairs.forEach(([x, y], i) => {
+      const top = 1 - i / pairs.length;
+      [x.domain, y.domain, x.showticklabels] = [[0, 1], [top - 1 / pairs.length + (i < pairs.length - 1 ? 80 / layout.height : 0), top], true];
+      heads[i].forEach((head) => { [head.x, head.y] = [0.5, top]; });
+    });
+    box.style.height = `${layout.height}px`;
+  };
+
   // On a narrow screen a legend beside the plot would take its room: it goes below, a line an entry.
   const narrow = (box, { data, layout }) => {
     const entries = data.filter((line) => line.name && line.showlegend !== false).length;
@@ -237,6 +261,7 @@
   const make = (box) => {
     const figure = known.get(box);
     const over = named(box, figure);
+    stacked(box, figure);
     narrow(box, figure);
     const mark = document.createElement("div");
     mark.className = "cursor";
