@@ -71,6 +71,7 @@ from crossbody.reference.core.slips import dies_out
 from crossbody.reference.kinds import Bytes
 
 EARLY = 0.5  # part of a step before which a gap that opens again has been below zero for too few of its places
+WITH_IT, BEFORE_IT = 1.2, 0.5  # of what a step up to an event is, that is taken anew with or without it
 PULLS = 1e-6  # part of the largest force by which a contact pulls that is no rounding of where it lets go
 
 
@@ -207,7 +208,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     """Set s.theta to the first switching in the step, NEVER if none, and hit[i] for all.
 
     Returns:
-        0, TOO_LONG where the step must be taken anew and shorter, or a negative code.
+        0, TOO_LONG where the part s.theta of the step is taken in its place, or a negative code.
     """
     s.theta = NEVER
     if s.ng > 0:
@@ -253,10 +254,12 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
     if s.theta <= 1.0:
         _tie(s, w)
         if _leaves_early(s, w, mode):
+            s.theta *= WITH_IT
             return TOO_LONG
         if s.frictional:
             _stop_first(K, s, m, w, mode)
             if s.theta <= 1.0 and ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0:
+                s.theta *= BEFORE_IT
                 return TOO_LONG
     return 0
 
@@ -271,7 +274,7 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
         return False
     for i in range(s.nc):
         if w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC:
-            return not (w.rates[0, i] >= 0.0 and opens(s, w, i, s.theta))
+            return True
     return False
 
 
