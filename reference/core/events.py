@@ -270,12 +270,10 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
 
     Free flight may be one step of any length: in one so long its places show nothing of when the contact presses.
     """
-    if s.method == EXACT or s.theta >= EARLY:
-        return False
-    for i in range(s.nc):
-        if w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC:
-            return True
-    return False
+    leaves = False
+    for i in range(s.nc if s.theta < EARLY and s.method != EXACT else 0):
+        leaves = leaves or (w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC)
+    return bool(leaves)
 
 
 @compiled

@@ -13,8 +13,8 @@ from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 
 CORNERS = ((0.1, 0.1, -0.05), (-0.1, 0.1, -0.05), (0.1, -0.1, -0.05), (-0.1, -0.1, -0.05), (0.0, 0.0, 0.12))
 HEIGHT, SIDE = 0.17, 0.2
-PASSED = 15
-"""A pyramid one corner of which slid on across its old way: at two of seven tolerances another one broke loose."""
+LET_GO = (65, 112)
+"""Pyramids of which a corner let go at one of the tolerances, as another one's slip died out."""
 TIMES = np.linspace(0.0, 0.3, 61)
 MOVED = 1e-8  # by which starts are moved to see how fast motions part
 ALLOWED = 100.0  # times as much as tolerances may be off that much
@@ -23,7 +23,9 @@ ALLOWED = 100.0  # times as much as tolerances may be off that much
 def pyramid(mass: float, mu: float, slope: float, law: RowLaw) -> Scene:
     """A solid pyramid with a square base, about its own middle, on a floor with gravity tilted by `slope`."""
     along, upright = mass * (SIDE**2 / 20.0 + 3.0 * HEIGHT**2 / 80.0), mass * SIDE**2 / 10.0
-    body = Body(name="b", mass=mass, com=(0.0, 0.0, -0.05 + HEIGHT / 4.0), inertia=(along, along, upright, 0.0, 0.0, 0.0))
+    body = Body(
+        name="b", mass=mass, com=(0.0, 0.0, -0.05 + HEIGHT / 4.0), inertia=(along, along, upright, 0.0, 0.0, 0.0)
+    )
     return Scene(
         bodies=(body,), joints=(Joint(name="free", body="b", type="free"),),
         shapes=(Shape(name="floor", type="plane"), Shape(name="s", body="b", type="hull", corners=CORNERS)),
@@ -60,11 +62,14 @@ def off(scene: Scene, q: np.ndarray, v: np.ndarray, tolerances: tuple[float, ...
     worst = 0.0
     for rtol in tolerances:
         found, last = motion(scene, q, v, rtol)
+        sure = min(known, last)
         part = np.abs(found - truth).max(1) / (rtol * np.maximum.accumulate(spread) * max(1.0, np.abs(truth).max()))
-        worst = max(worst, float(part[TIMES < 0.98 * min(known, last)].max(initial=0.0)))
+        worst = max(worst, float(part[np.less(TIMES, 0.98 * sure)].max(initial=0.0)))
     return worst
 
 
-@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 40))])
+@pytest.mark.parametrize(
+    "seed", [*range(3), *LET_GO, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(3, 100) if seed != 65)]
+)
 def test_a_fallen_pyramid_moves_alike_at_all_tolerances(seed: int) -> None:
     assert off(*dropped(seed), (1e-7, 1e-8, 1e-9)) < ALLOWED
