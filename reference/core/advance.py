@@ -56,6 +56,7 @@ from crossbody.reference.core.layout import (
     open_model,
     open_work,
 )
+from crossbody.reference.core.machine import known
 from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
@@ -110,7 +111,7 @@ def _until_clear(s: Any, w: Work, b: Buffers, h: float) -> float:
     """No longer a step than h, or in which what was let go below its surface comes out: a longer one is cut there."""
     first = np.inf
     for i in range(s.nc):
-        if b.mode[i] == BALLISTIC and w.gap[i] < 0.0 < w.rate[i]:
+        if b.mode[i] == BALLISTIC and w.gap[i] < -known(s, w) and w.rate[i] > 0.0:
             first = min(first, -w.gap[i] / w.rate[i])
     return float(min(h, max(CLEARLY * first, LEAST * h)))
 

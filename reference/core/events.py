@@ -272,7 +272,8 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
     """
     leaves = False
     for i in range(s.nc if s.theta < EARLY and s.method != EXACT else 0):
-        leaves = leaves or (w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC)
+        below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s)  # not by rounding, as one that rests
+        leaves = leaves or (below and w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC)
     return bool(leaves)
 
 
