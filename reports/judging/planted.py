@@ -204,8 +204,10 @@ def gaps(plain: Plain) -> Iterator[Control]:
     """Put the gap of a row off at one sample, or at as many as are not looked at; open what is closed."""
     run, rows = plain.run, plain.normal
     closed = np.flatnonzero(~plain.case.law.unilateral & (plain.case.law.a0 > 0.0))
+    least = TINY * max(1.0, float(np.max(np.abs(run.q))))
     for k in plain.some(rows):
-        some, every = (PART * max(float(np.max(np.abs(gap))), RESTS) for gap in (run.gap[:, rows], run.gap))
+        some = PART * max(float(np.max(np.abs(run.gap[:, rows]))), RESTS, least)
+        every = PART * max(float(np.max(np.abs(run.gap))), least)
         own, wide = float(np.max(np.abs(run.gap[:, k]))), -(-len(run.t) // LOOKED)
         most = (1.0 + SLACK) * some / own if own > 0.0 else np.inf  # its bodies may be farther than it ever opens
         for i, sign in plain.both():

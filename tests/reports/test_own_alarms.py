@@ -1,0 +1,44 @@
+"""The reference beside its own truth on robots: no number of it is outside, and no control fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from crossbody import cases
+from crossbody.cases import Case
+from crossbody.reports.judging.verdict import Word
+from crossbody.reports.runs import jobs, study
+
+FIVE_BAR = """
+<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1" friction=".6 0 0"/>
+<body name="u0" pos=".15 0 .45"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .15 0 -.2" size=".02" mass=".3"
+ contype="0" conaffinity="0"/><body name="l0" pos=".15 0 -.2"><joint axis="0 1 0"/><geom type="capsule"
+ fromto="0 0 0 -.22 0 -.2" size=".015" mass=".2" contype="0" conaffinity="0"/><body name="p" pos="-.22 0 -.2">
+<joint axis="0 1 0" damping=".01"/><geom type="sphere" size=".02" pos="-.15 0 -.03" mass=".02"/>
+<geom type="sphere" size=".02" pos="0 0 -.03" mass=".02"/></body></body></body>
+<body name="u1" pos="-.15 0 .45"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 -.15 0 -.2" size=".02"
+ mass=".3" contype="0" conaffinity="0"/><body name="l1" pos="-.15 0 -.2"><joint axis="0 1 0"/><geom type="capsule"
+ fromto="0 0 0 .22 0 -.2" size=".015" mass=".2" contype="0" conaffinity="0"/></body></body></worldbody>
+<equality><connect body1="p" body2="l1" anchor="-.16 0 0" solref=".01 .5"/></equality></mujoco>
+"""
+
+
+def robot(folder: Path, text: str, **given: float) -> Case:
+    """A robot's file as a case."""
+    path = folder / "robot.xml"
+    path.write_text(text, encoding="utf-8")
+    return cases.from_file(path, **given)
+
+
+def wrong(case: Case, profile: str = "compiled") -> list[tuple[str, str, float, str]]:
+    """Engine, metric, number and reason of every row that is outside of a case in the reference."""
+    result = jobs.run_case(case, (jobs.Pick(engine="reference", profile=profile, every=False),), budget=2.0)
+    rows = study.judge([result], {case.label: ""})
+    assert len(rows) > 5
+    outside = [row for row in rows if row["verdict"] in (Word.OUTSIDE, Word.CRASHED)]
+    return [(row["engine"], row["metric"], row["value"], row["why"]) for row in outside]
+
+
+def test_a_linkage_that_stands_with_rows_that_follow_from_others(tmp_path: Path) -> None:
+    """One row of its loop has no multiplier, and its feet have gaps of rounding size, as have its coordinates."""
+    assert wrong(robot(tmp_path, FIVE_BAR, t_end=0.05, friction=1)) == []
