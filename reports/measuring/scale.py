@@ -48,7 +48,7 @@ def least(named: Sequence[Coordinate], rates: bool = False) -> Floats:
 
 
 def rounded(q: Floats) -> float:
-    """Return what gaps are measured by at least, m or rad: where a robot's coordinates are all zero its lengths are not.
+    """Return what gaps are measured by at least, m or rad: coordinates may all be zero where lengths are not.
 
     Args:
         q: of a motion (n, nq).
