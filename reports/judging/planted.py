@@ -257,24 +257,67 @@ def energies(plain: Plain) -> Iterator[Control]:
 
 FORCED = {2.0: "doubled", 0.0: "left out"}
 """Factors on all forces."""
+WEAK = 3e-3
+"""Part of the force that moves a mechanism below which what its rows carry is not what their errors are measured by."""
 
 
 def forces(plain: Plain) -> Iterator[Control]:
     """Double all multipliers and impulses, or leave them out; put one off, to where it pulls, or pushes at nothing."""
-    run, rows = plain.run, plain.normal
+    run = plain.run
     largest = float(np.max(np.abs(run.lam), initial=0.0))
     if not largest > RESTS and not any(event.impulse for event in run.events):
+        return
+    least = WEAK * _moving(run)
+    yield from _impulses(plain, least)
+    if not largest > RESTS:
+        return
+    yield from _laws(plain, least)
+    k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
+    for i, sign in plain.both() if largest > least else ():
+        one = plain.off("lam", (i, k), sign * MUCH * largest)
+        yield Control(fault="a multiplier off at one sample", run=one, sees={"lam_error": exactly(MUCH)})
+    yield from _pulling(plain)
+
+
+def _moving(run: Trajectory) -> float:
+    """Return the force, N, that moves a mechanism: the energy that turns over, over its way."""
+    way = float(np.max(np.ptp(run.q, axis=0), initial=0.0))
+    return max(float(run.energy[:, 0].max()), float(np.ptp(run.energy[:, 1]))) / way if way > 0.0 else 0.0
+
+
+def _impulses(plain: Plain, least: float) -> Iterator[Control]:
+    """Put all impulses off; where rows carry less than `least`, N, let one carry what moves the mechanism."""
+    run, seen = plain.run, ("lam_impulse_path", "lam_impulse")
+    if float(np.max(np.abs(np.trapezoid(run.lam, run.t, axis=0)), initial=0.0)) < least * float(np.ptp(run.t)):
+        pressed = _pressed(run, least / WEAK)
+        yield Control(fault=f"a row presses by {least / WEAK:.3g} more", run=pressed, sees=dict.fromkeys(seen, LARGE))
         return
     for times, said in FORCED.items():
         events = tuple(replace(event, impulse=times * event.impulse) for event in run.events)
         yield Control(
             fault=f"multipliers and impulses {said}", run=replace(run, lam=times * run.lam, events=events),
-            sees=dict.fromkeys(("lam_impulse_path", "lam_impulse"), roughly(1.0)),
+            sees=dict.fromkeys(seen, roughly(1.0)),
         )  # fmt: skip
-    if not largest > RESTS:
-        return
-    few = taken(run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
+
+
+LARGE = (1.0 / ROUGH, np.inf)
+"""Range of what is as large as what it is measured by, or far larger."""
+
+
+def _pressed(run: Trajectory, more: float) -> Trajectory:
+    """Return a motion whose row that carries most carries more, N, throughout."""
+    k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
+    return _with(run, "lam", (slice(None), k), run.lam[:, k] + more)
+
+
+def _laws(plain: Plain, least: float) -> Iterator[Control]:
+    """Put multipliers off the law, at all of a few samples and at one."""
+    few = taken(plain.run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
     at = tuple(np.unravel_index(np.argmax(np.abs(few.lam)), few.lam.shape))
+    if np.abs(few.lam[at]) < least:
+        more, said = _pressed(few, least / WEAK), f"a row presses by {least / WEAK:.3g} more"
+        yield Control(fault=said, run=more, sees={"law_residual": LARGE}, plain=few)
+        return
     for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
         other = replace(few, lam=times * few.lam)
         yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": roughly(1.0)}, plain=few)
@@ -284,10 +327,11 @@ def forces(plain: Plain) -> Iterator[Control]:
             fault=f"the largest multiplier {sign * MUCH:g} off at one sample", run=one, sees={"law_residual": seen},
             plain=few,
         )  # fmt: skip
-    k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
-    for i, sign in plain.both():
-        one = plain.off("lam", (i, k), sign * MUCH * largest)
-        yield Control(fault="a multiplier off at one sample", run=one, sees={"lam_error": exactly(MUCH)})
+
+
+def _pulling(plain: Plain) -> Iterator[Control]:
+    """Let rows that open pull, or push at nothing, at one sample."""
+    run, rows = plain.run, plain.normal
     most = PART * float(np.max(np.abs(run.lam[:, rows]), initial=0.0))
     wrong = {"pulls": (-most, np.isin(run.mode, PUSHES)), "pushes at nothing": (most, run.mode == Mode.FREE)}
     for k in plain.some(rows) if most > 0.0 else ():

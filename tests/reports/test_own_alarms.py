@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from crossbody import cases
 from crossbody.cases import Case
 from crossbody.reports.judging.verdict import Word
@@ -42,3 +44,21 @@ def wrong(case: Case, profile: str = "compiled") -> list[tuple[str, str, float, 
 def test_a_linkage_that_stands_with_rows_that_follow_from_others(tmp_path: Path) -> None:
     """One row of its loop has no multiplier, and its feet have gaps of rounding size, as have its coordinates."""
     assert wrong(robot(tmp_path, FIVE_BAR, t_end=0.05, friction=1)) == []
+
+
+HELD = """
+<mujoco><worldbody><body gravcomp="1"><joint name="arm" axis="0 1 0" armature=".1"/>
+<geom type="capsule" fromto="0 0 0 .5 0 0" size=".03" mass="3"/>
+<body pos=".5 0 0"><joint name="a" type="slide" axis="0 1 0"
+ stiffness="{stiffness}"/><geom type="box" size=".01 .01 .02" mass=".02"/></body>
+<body pos=".5 0 0"><joint name="b" type="slide" axis="0 -1 0"/><geom type="box" size=".01 .01 .02" mass=".02"/></body>
+</body></worldbody><equality><joint joint1="a" joint2="b" solref=".01 1"/></equality>
+<keyframe><key name="home" qpos="0 .001 .001" qvel="2 0 0"/></keyframe><contact/></mujoco>
+"""
+
+
+@pytest.mark.parametrize("stiffness", [0.3, 3.0, 3e3])
+def test_an_arm_whose_couplings_carry_next_to_nothing(tmp_path: Path, stiffness: float) -> None:
+    """A spring at one of two fingers that a row holds together: its force is far below what moves the arm, or not."""
+    text = HELD.format(stiffness=stiffness)
+    assert wrong(robot(tmp_path, text, t_end=0.2, without="contacts")) == []
