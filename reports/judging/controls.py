@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
 from crossbody.engines.contract import QUANTITIES
 from crossbody.reports import metrics
-from crossbody.reports.judging.audit import audit
+from crossbody.reports.judging.audit import audit, rounded, states
 from crossbody.reports.judging.planted import Range, faults
 from crossbody.reports.judging.truth import agreement
 from crossbody.reports.measuring.truth import Truth, taken
@@ -96,7 +96,7 @@ def unheard(case: Case) -> Iterator[Blind]:
         theirs = engines.load("reference").prepare(case, "compiled").audit()
     except CaseUnsupported:
         return
-    asked = [key for key in QUANTITIES if key in theirs and _something(key, theirs[key], case)]
+    asked = [key for key in QUANTITIES if key in theirs and _something(key, theirs, case)]
     large, small = (
         {row.quantity: row for row in audit({key: _times(theirs[key], by) for key in asked}, theirs, case)}
         for by in (1.0 + MORE, 1.0 - MORE)
@@ -121,14 +121,19 @@ def _times(value: Any, by: float) -> Any:
     return by * np.asarray(value, dtype=np.float64)
 
 
-def _something(key: str, value: Any, case: Case) -> bool:
-    """Whether a value, or a function at the start, is other than 0 somewhere."""
+def _something(key: str, theirs: Mapping[str, Any], case: Case) -> bool:
+    """Whether a value, or a function at the start, is other than 0 somewhere, and than rounding."""
+    least = rounded(key, theirs, states(case, theirs)) if key == "bias" else 0.0
+    return _more(key, theirs[key], case, least)
+
+
+def _more(key: str, value: Any, case: Case, least: float) -> bool:
     if isinstance(value, Mapping):
-        return any(_something(key, one, case) for one in value.values())
+        return any(_more(key, one, case, least) for one in value.values())
     if callable(value):
         value = value(case.q0) if key in OF_POSITIONS else value(case.q0, case.v0)
     numbers = np.asarray(value, dtype=np.float64)
-    return bool(np.isfinite(numbers).all() and np.any(numbers))
+    return bool(np.isfinite(numbers).all() and np.any(np.abs(numbers) > least))
 
 
 def recorded(run: Trajectory) -> Callable[[Floats], Trajectory]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from crossbody import cases
+from crossbody import cases, engines
 from crossbody.cases import Case
+from crossbody.reports.judging import audit
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.runs import jobs, study
 
@@ -62,3 +64,30 @@ def test_an_arm_whose_couplings_carry_next_to_nothing(tmp_path: Path, stiffness:
     """A spring at one of two fingers that a row holds together: its force is far below what moves the arm, or not."""
     text = HELD.format(stiffness=stiffness)
     assert wrong(robot(tmp_path, text, t_end=0.2, without="contacts")) == []
+
+
+BALLS = """
+<mujoco><option gravity="0 0 0" timestep="1e-4"/>
+<default><geom condim="3" friction=".3 0 0" solref=".01 .05" solimp=".9 .9 .001"/></default><worldbody>
+<body pos="-.5 0 .0451"><freejoint/><geom type="sphere" size=".05" mass="1"/></body>
+<body><freejoint/><geom type="sphere" size=".05" mass="1"/></body></worldbody>
+<keyframe><key name="go" qpos="-.5 0 .0451 1 0 0 0 0 0 0 1 0 0 0" qvel="2.677 0 0 0 0 0 0 0 0 0 0 0"/></keyframe>
+</mujoco>
+"""
+
+
+def test_a_slide_so_short_that_a_fault_of_it_is_no_larger_than_errors_grow(tmp_path: Path) -> None:
+    assert wrong(robot(tmp_path, BALLS, t_end=0.3)) == []
+
+
+def test_free_balls_without_gravity_have_the_forces_of_another_program(tmp_path: Path) -> None:
+    """None but for rounding, which is no difference."""
+    case = robot(tmp_path, BALLS)
+    mine, theirs = (engines.load(name).prepare(case, profile).audit() for name, profile in ENGINES)
+    found = {row.quantity: row for row in audit.audit(mine, theirs, case)}
+    assert found["bias"].ok
+    off = {**mine, "bias": lambda q, v: np.asarray(mine["bias"](q, v)) + 1e-6}
+    assert not {row.quantity: row for row in audit.audit(off, theirs, case)}["bias"].ok
+
+
+ENGINES = (("mujoco", "as_is"), ("reference", "compiled"))
