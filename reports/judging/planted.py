@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.friction import slips
 from crossbody.reports.measuring.truth import taken
 
 if TYPE_CHECKING:
-    from crossbody.reference import System
+    pass
 
 PART = 0.02
 """Part of the largest by which a signal is off: no limit on a motion may be as wide."""
@@ -386,10 +387,8 @@ def modes(plain: Plain) -> Iterator[Control]:
 
 def _slips(plain: Plain, i: int, way: slice) -> bool:
     """Whether a place slips at a sample with at least a part of the fastest coordinate's speed."""
-    system, run = equations(plain.case), plain.run
-    if system is None:
-        return False
-    slip = float(np.linalg.norm(_rates(system, run.q[i], run.v[i])[way]))
+    run = plain.run
+    slip = float(np.linalg.norm(slips(plain.case, taken(run, np.array([i])))[0, way]))
     return slip > TENTH * float(np.max(np.abs(run.v)))
 
 
@@ -483,15 +482,15 @@ def switched(plain: Plain) -> Iterator[Control]:
 def _shows(plain: Plain, event: Event, t: float) -> bool:
     """Whether at an instant before a change slip, or what friction is below its bound, is far from none."""
     run, (rows, ways, bound) = plain.run, _bounds(plain.case, plain.run)
-    if (system := equations(plain.case)) is None or event.contact not in rows:
+    if event.contact not in rows:
         return False
     k, i = int(np.searchsorted(rows, event.contact)), int(np.searchsorted(run.t, t))
     if event.after == Mode.SLIP:
         below = np.abs(bound[:, k] - np.linalg.norm(run.lam[:, ways[k]], axis=1))
         return bool(below[i] > FAR * float(bound[:, k].max()))
-    some = [i, *range(0, len(run.t), -(-len(run.t) // FEW))]
-    slips = [float(np.linalg.norm(_rates(system, run.q[j], run.v[j])[ways[k]])) for j in some]
-    return slips[0] > FAR * max(slips)
+    rates = slips(plain.case, taken(run, np.array([i, *range(0, len(run.t), -(-len(run.t) // FEW))])))[:, ways[k]]
+    speeds = np.linalg.norm(rates, axis=1)
+    return bool(speeds[0] > FAR * speeds.max())
 
 
 def clocks(plain: Plain) -> Iterator[Control]:
@@ -548,7 +547,7 @@ def _cumulated(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
         return
     row = ways[int(plain.draw.integers(len(ways)))].start
     force = float(np.max(np.abs(run.lam))) * plain.draw.uniform(-1.0, 1.0, len(run.t))
-    slip = np.array([_rates(system, q, v)[row] for q, v in zip(run.q, run.v, strict=True)])
+    slip = slips(plain.case, run)[:, row]
     sees = {}
     for name, power in (("friction_impulse", force), ("friction_work", force * slip)):
         sums = np.append(0.0, np.cumsum([0.5 * (run.t[i + 1] - run.t[i]) * (power[i] + power[i + 1])
@@ -564,16 +563,10 @@ def _creeping(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
     if system is None or not ways:
         return
     v = run.v[-1] + PART * plain.draw.normal(size=run.v.shape[1])
-    rates = _rates(system, run.q[-1], v)
-    fastest = max(float(np.linalg.norm(rates[way])) for way in ways)
     moving = replace(run, v=np.concatenate([run.v[:-1], [v]]))
+    rates = slips(plain.case, moving)[-1]
+    fastest = max(float(np.linalg.norm(rates[way])) for way in ways)
     yield Control(fault="what holds moves", run=moving, plain=run, sees={"creep_speed": exactly(fastest)})
-
-
-def _rates(system: System, q: Floats, v: Floats) -> Floats:
-    """Return the rates of all rows (nc,) against what their surfaces do by themselves."""
-    rates: Floats = system.gap(q, v)[1] - np.asarray(system.drift, dtype=np.float64)
-    return rates
 
 
 def _bounds(case: Case, run: Trajectory) -> tuple[NDArray[np.intp], list[slice], Floats]:

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import Case
+from crossbody.cases import Case, Mode, Tier
+from crossbody.reports import metrics
 from crossbody.reports.judging import audit
 from crossbody.reports.judging.verdict import Word
+from crossbody.reports.measuring.truth import from_run
 from crossbody.reports.runs import jobs, study
 
 FIVE_BAR = """
@@ -91,3 +93,22 @@ def test_free_balls_without_gravity_have_the_forces_of_another_program(tmp_path:
 
 
 ENGINES = (("mujoco", "as_is"), ("reference", "compiled"))
+
+
+PUCK = """
+<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .02"><freejoint/>
+<geom type="cylinder" size=".1 .02" mass="1"/></body></worldbody>
+<keyframe><key name="shove" qpos="0 0 .02 1 0 0 0" qvel="{} {} 0 0 0 {}"/></keyframe></mujoco>
+"""
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_friction_opposes_the_slip_of_the_points_on_which_a_puck_stands(tmp_path: Path, seed: int) -> None:
+    """They are those that lie where its load leans to at the start."""
+    text = PUCK.format(*np.random.default_rng(seed).uniform(-1.0, 1.0, 2), 5.0)
+    case = robot(tmp_path, text, t_end=0.05, friction=1, without="rolling")
+    run = engines.load("reference").prepare(case, "compiled").run()
+    assert np.isin(run.mode, Mode.SLIP).any()
+    angle = metrics.of(case)["friction_angle"].measure(from_run(run, Tier.D, ""), run, case)
+    assert angle is not None
+    assert angle < 1e-9
