@@ -134,7 +134,8 @@ def test_an_equilibrium_of_a_file_rests_on_contacts_that_slide(
 
 
 HULL = """<mujoco><asset><mesh name="m" vertex="-.1 -.1 -.1 .1 -.1 -.1 0 .1 -.1 0 0 .1"/></asset><worldbody>
-  <geom name="floor" type="plane" size="1 1 1"/><body pos="0 0 .1"><geom name="table" type="box" size=".5 .5 .1"/></body>
+  <geom name="floor" type="plane" size="1 1 1"/>
+  <body pos="0 0 .1"><geom name="table" type="box" size=".5 .5 .1"/></body>
   <body pos="0 0 .32"><freejoint/><geom name="hull" type="mesh" mesh="m"/></body></worldbody></mujoco>"""
 
 
