@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier
 from crossbody.reports import metrics
-from crossbody.reports.judging import audit
+from crossbody.reports.judging import audit, truth
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.truth import from_run
 from crossbody.reports.runs import jobs, study
@@ -112,3 +113,18 @@ def test_friction_opposes_the_slip_of_the_points_on_which_a_puck_stands(tmp_path
     angle = metrics.of(case)["friction_angle"].measure(from_run(run, Tier.D, ""), run, case)
     assert angle is not None
     assert angle < 1e-9
+
+
+def test_a_truth_whose_witness_takes_too_long_is_held_to_the_same_budget(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    budgets, growing = [], truth._growing
+
+    def told(*given: Any) -> Any:
+        budgets.append(given[-1])
+        return growing(*given)
+
+    monkeypatch.setattr(truth, "_growing", told)
+    monkeypatch.setattr(truth, "_in_time", lambda case, way, *_: "too long" if way == "cvode" else truth.tight(case))
+    truth.truth_of(robot(tmp_path, BALLS, t_end=0.05, friction=1), budget=1.5)
+    assert budgets == [1.5]
