@@ -49,6 +49,7 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
             all(row.verdict == Word.OUTSIDE for row in rows)
             or _lets_pass(case, name, value)
             or _grown(near, name, value)
+            or (name == "rate_residual" and near.blurred)
         )
 
     for name, value, (least, most), fault in (
@@ -146,7 +147,8 @@ def _unsaid_of_limits(judge_: Judge) -> Iterator[tuple[str, str]]:
     """Yield limits of which numbers on either side, or none, are not said to be so."""
     for name in dict.fromkeys([*judge_.claims, *(limit.metric for limit in judge_.limits)]):
         claim, limit = judge_.claims.get(name), judge_.limit(name)
-        if name in ("*", "audit") or (limit is None and claim is None) or (limit is not None and limit.known):
+        silent = (limit is None and claim is None) or (limit is not None and limit.known)
+        if name in ("*", "audit") or silent or (name == "rate_residual" and judge_.blurred):
             continue
         expected, most = 0.0 if claim is None else claim.expected, 0.0 if limit is None else limit.value
         beside = BESIDE * (most or abs(expected) or 1.0)

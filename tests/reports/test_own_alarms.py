@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier
 from crossbody.reports import metrics
 from crossbody.reports.judging import audit, truth
+from crossbody.reports.judging.run_verdicts import Entry, verdicts
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.truth import from_run
 from crossbody.reports.runs import jobs, study
@@ -128,3 +130,18 @@ def test_a_truth_whose_witness_takes_too_long_is_held_to_the_same_budget(
     monkeypatch.setattr(truth, "_in_time", lambda case, way, *_: "too long" if way == "cvode" else truth.tight(case))
     truth.truth_of(robot(tmp_path, BALLS, t_end=0.05, friction=1), budget=1.5)
     assert budgets == [1.5]
+
+
+@pytest.mark.parametrize("a1", [1e4, 1e5, 1e6])
+def test_a_stiff_row_that_is_always_on_and_starts_off_its_law(a1: float) -> None:
+    """It brings the ball to its rate within 1/a1, between two samples."""
+    case = cases.load("bouncing_ball", "bilateral", a0=100.0 * a1, a1=a1, a2=0.0)
+    assert wrong(case) == []
+
+
+def test_velocities_that_are_wrong_are_outside_where_samples_tell() -> None:
+    case = cases.load("bouncing_ball", "bilateral")
+    known = truth.truth_of(case)
+    fast = replace(known.trajectory, v=1.1 * known.trajectory.v)
+    rows = verdicts(case, Entry(engine="reference", profile="compiled", run=fast), known, "")
+    assert {row.metric: row.verdict for row in rows}["rate_residual"] == Word.OUTSIDE
