@@ -17,6 +17,7 @@ from crossbody.reports.judging.run_verdicts import Entry, verdicts
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.truth import from_run
 from crossbody.reports.runs import jobs, study
+from crossbody.reports.runs.store import Trace, load, save
 
 FIVE_BAR = """
 <mujoco><worldbody><geom name="floor" type="plane" size="5 5 1" friction=".6 0 0"/>
@@ -145,3 +146,15 @@ def test_velocities_that_are_wrong_are_outside_where_samples_tell() -> None:
     fast = replace(known.trajectory, v=1.1 * known.trajectory.v)
     rows = verdicts(case, Entry(engine="reference", profile="compiled", run=fast), known, "")
     assert {row.metric: row.verdict for row in rows}["rate_residual"] == Word.OUTSIDE
+
+
+def test_a_motion_without_rows_is_read_back_with_its_account(tmp_path: Path) -> None:
+    case = robot(tmp_path, HELD.format(stiffness=1.0), t_end=0.05, without="contacts,loops")
+    run = engines.load("reference").prepare(case, "compiled").run()
+    assert run.ledger is not None
+    assert run.ledger.contact.shape == (len(run.t), 0)
+    save(tmp_path / "run.parquet", Trace(run=run, about={}))
+    read = load(tmp_path / "run.parquet").run.ledger
+    assert read is not None
+    for name in ("contact", "input", "dissipated"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(run.ledger, name))
