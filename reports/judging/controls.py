@@ -20,6 +20,7 @@ from crossbody.reports import metrics
 from crossbody.reports.judging.audit import audit, rounded, states
 from crossbody.reports.judging.planted import Range, faults
 from crossbody.reports.judging.truth import agreement
+from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.truth import Truth, taken
 
 SAME = 1e-12
@@ -42,10 +43,10 @@ def unseen(case: Case, truth: Truth, outside: Callable[[str, float], bool]) -> I
         truth: up to where it is trusted.
         outside: whether a number of a metric, off by a fault, is judged as outside wherever it is judged.
     """
-    run = truth.trajectory
+    run = _whole(truth.trajectory)
     if not all(np.isfinite(getattr(run, name)).all() for name in ("t", "q", "v", "gap", "lam", "energy")):
         return
-    known, every = replace(truth, at=recorded(run)), metrics.of(case)
+    known, every = replace(truth, trajectory=run, at=recorded(run)), metrics.of(case)
     held = _held(known, run, case)
     plain: dict[tuple[str, int], float | None] = {}
     blind: set[str] = set()
@@ -62,6 +63,12 @@ def unseen(case: Case, truth: Truth, outside: Callable[[str, float], bool]) -> I
             if not least - own <= found <= most + own or (control.wrong and not outside(name, found)):
                 blind.add(name)
                 yield name, found, (least, most), control.fault
+
+
+def _whole(run: Trajectory) -> Trajectory:
+    """Return a motion in which rows that follow from others carry nothing, as these carry what they would."""
+    known = told(run)
+    return run if known is None or known.all() else replace(run, lam=np.where(known, run.lam, 0.0))
 
 
 def _held(truth: Truth, run: Trajectory, case: Case) -> Set[str]:

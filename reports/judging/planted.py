@@ -319,6 +319,8 @@ def _laws(plain: Plain, least: float) -> Iterator[Control]:
         more, said = _pressed(few, least / WEAK), f"a row presses by {least / WEAK:.3g} more"
         yield Control(fault=said, run=more, sees={"law_residual": LARGE}, plain=few)
         return
+    if not _acts(plain.case, few, int(at[0]), int(at[1])):
+        return
     for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
         other = replace(few, lam=times * few.lam)
         yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": roughly(1.0)}, plain=few)
@@ -328,6 +330,16 @@ def _laws(plain: Plain, least: float) -> Iterator[Control]:
             fault=f"the largest multiplier {sign * MUCH:g} off at one sample", run=one, sees={"law_residual": seen},
             plain=few,
         )  # fmt: skip
+
+
+def _acts(case: Case, run: Trajectory, i: int, row: int) -> bool:
+    """Whether multipliers, and that of a row at a sample, move anything: at a dead centre no law tells them."""
+    if (system := equations(case)) is None:
+        return False
+    H = system.equations_along(run.t, run.q, run.v)[2]
+    pushed, largest = np.einsum("mkn,mk->mn", H, run.lam), float(np.max(np.abs(H), initial=0.0))
+    all_, own = float(np.max(np.abs(pushed), initial=0.0)), float(np.max(np.abs(H[i, row]), initial=0.0))
+    return all_ > WEAK * largest * float(np.max(np.abs(run.lam))) and own > WEAK * largest
 
 
 def _pulling(plain: Plain) -> Iterator[Control]:

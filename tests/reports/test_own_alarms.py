@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier
 from crossbody.reports import metrics
-from crossbody.reports.judging import audit, truth
+from crossbody.reports.judging import audit, controls, truth
 from crossbody.reports.judging.run_verdicts import Entry, verdicts
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.truth import from_run
@@ -158,3 +159,19 @@ def test_a_motion_without_rows_is_read_back_with_its_account(tmp_path: Path) -> 
     assert read is not None
     for name in ("contact", "input", "dissipated"):
         np.testing.assert_array_equal(getattr(read, name), getattr(run.ledger, name))
+
+
+def test_a_metric_that_is_blind_is_told_of_a_linkage_with_rows_that_follow_from_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What these would carry is carried by the others, so that faults can be put there too."""
+    case = robot(tmp_path, FIVE_BAR, t_end=0.05, friction=1)
+    known, every = truth.truth_of(case), metrics.of(case)
+    assert np.isnan(known.trajectory.lam).any()
+    assert list(controls.unseen(case, known, lambda *_: True)) == []
+    for name in ("law_residual", "velocity", "gap_residual"):
+        own = metrics.load(name)
+        none = SimpleNamespace(UNIT=own.UNIT, CLAIMED=own.CLAIMED, measure=lambda *_: 0.0)
+        with monkeypatch.context() as changed:
+            changed.setattr(metrics, "of", lambda _, one={**every, name: none}: one)
+            assert [one[0] for one in controls.unseen(case, known, lambda *_: True)] == [name]
