@@ -34,6 +34,18 @@ FIVE_BAR = """
 """
 
 
+FOUR_BAR = """
+<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1" friction=".5 0 0"/>
+<body pos="0 0 .3490092739265187"><joint axis="0 1 0" frictionloss=".05"/><geom type="capsule" size=".02" mass=".4"
+ fromto="0 0 0 .1 0 -.2" contype="0" conaffinity="0"/><body name="c" pos=".1 0 -.2"><joint axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 .4 0 0" size=".02" contype="0" conaffinity="0" mass=".6"/>
+<geom type="sphere" pos=".2 0 -.1" size=".04900927392651871" mass=".2"/></body></body>
+<body name="b" pos=".4 0 .3490092739265187"><joint axis="0 1 0" frictionloss=".05"/><geom type="capsule" size=".02"
+ fromto="0 0 0 .1 0 -.2" contype="0" conaffinity="0" mass=".4"/></body></worldbody>
+<equality><connect body1="c" body2="b" anchor=".4 0 0" solref=".01 .5"/></equality></mujoco>
+"""
+
+
 def robot(folder: Path, text: str, **given: float) -> Case:
     """A robot's file as a case."""
     path = folder / "robot.xml"
@@ -50,9 +62,13 @@ def wrong(case: Case, profile: str = "compiled") -> list[tuple[str, str, float, 
     return [(row["engine"], row["metric"], row["value"], row["why"]) for row in outside]
 
 
-def test_a_linkage_that_stands_with_rows_that_follow_from_others(tmp_path: Path) -> None:
-    """One row of its loop has no multiplier, and its feet have gaps of rounding size, as have its coordinates."""
-    assert wrong(robot(tmp_path, FIVE_BAR, t_end=0.05, friction=1)) == []
+@pytest.mark.parametrize("text", [FIVE_BAR, FOUR_BAR], ids=["five-bar", "four-bar"])
+def test_a_linkage_that_stands_with_rows_that_follow_from_others(tmp_path: Path, text: str) -> None:
+    """One row of its loop has no multiplier, and its feet have gaps of rounding size, as have its coordinates.
+
+    What sticks holds more than moves: shares of multipliers that exert no force are no size to measure the law by.
+    """
+    assert wrong(robot(tmp_path, text, t_end=0.05, friction=1)) == []
 
 
 HELD = """
