@@ -184,6 +184,8 @@ def test_a_metric_that_is_blind_is_told_of_a_linkage_with_rows_that_follow_from_
     case = robot(tmp_path, FIVE_BAR, t_end=0.05, friction=1)
     known, every = truth.truth_of(case), metrics.of(case)
     assert np.isnan(known.trajectory.lam).any()
+    freed = np.where(known.trajectory.mode == Mode.STICK, Mode.FREE, known.trajectory.mode)
+    assert every["mode_contradicted"].measure(known, replace(known.trajectory, mode=freed), case)
     assert list(controls.unseen(case, known, lambda *_: True)) == []
     for name in ("law_residual", "velocity", "gap_residual"):
         own = metrics.load(name)
