@@ -272,6 +272,22 @@ def unknown(scene: Scene) -> dict[frozenset[str], str]:
     return {shapes: reason for shapes, reason in told.items() if reason}
 
 
+def rowless(scene: Scene) -> dict[frozenset[str], str]:
+    """Return of all pairs that have no rows though their shapes may meet the reason, by their shapes."""
+    types = {shape.name: shape.type for shape in scene.shapes}
+
+    def gapless(one: str, two: str) -> str:
+        if {(one, two), (two, one)} & PLACES.keys():
+            return f"the hull has more than {PLACES['plane', 'hull']} corners"
+        return f"the gap between a {one} and a {two} is not implemented"
+
+    return {
+        frozenset((pair.first, pair.second)): unknown_friction(scene, pair)
+        or gapless(types[pair.first], types[pair.second])
+        for pair in watched(scene)
+    }
+
+
 def check_pairs(scene: Scene) -> None:
     """Refuse pairs that have no rows though their shapes may meet."""
     inert_, shapes = inert(scene), {shape.name: shape for shape in scene.shapes}

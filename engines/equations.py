@@ -14,7 +14,7 @@ from typing import Any
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.installed import from_file
 from crossbody.cases.remembered import remembered
-from crossbody.cases.scene_contacts import unknown
+from crossbody.cases.scene_contacts import rowless
 from crossbody.reference import System
 
 SYSTEMS = "crossbody.reference.systems"
@@ -57,7 +57,7 @@ def system_of(case: Case) -> System:
 
     `covered` of the harness asks that of a motion; whoever takes the equations alone is told by every run of them.
     """
-    made, lost = equations_of(case), unknown(case.scene) if case.file and case.scene is not None else {}
+    made, lost = equations_of(case), rowless(case.scene) if case.file and case.scene is not None else {}
     return replace(made, findings=(*made.findings, _left_out(lost))) if lost else made
 
 

@@ -451,10 +451,19 @@ class System:
         self.gaps(0.0, *self._state(q, v), np.array(self.p), h, hd)
         return h, hd
 
-    def gaps_along(self, q: ArrayLike, v: ArrayLike) -> tuple[Floats, Floats]:
-        """Gaps and their rates (m, nc) along a motion, at its positions (m, nq) and velocities (m, n)."""
+    def begun(self, q: ArrayLike, v: ArrayLike | None = None) -> Floats:
+        """Return the parameters with the discrete state in which a motion begins at (q, v)."""
+        from crossbody.reference._state import started
+
+        return started(self, *self._state(q, v))[0]
+
+    def gaps_along(self, q: ArrayLike, v: ArrayLike, p: Floats | None = None) -> tuple[Floats, Floats]:
+        """Gaps and their rates (m, nc) along a motion, at its positions (m, nq) and velocities (m, n).
+
+        In the discrete state of the parameters p, those of the system if not given.
+        """
         places = np.ascontiguousarray(self._copied("q", q, (None,)))
-        speeds, p = self._copied("v", v, (len(places),)), np.array(self.p)
+        speeds, p = self._copied("v", v, (len(places),)), np.array(self.p if p is None else p)
         h, hd = np.zeros((len(places), self.nc)), np.zeros((len(places), self.nc))
         for i in range(len(places)):
             self.gaps(0.0, places[i], speeds[i], p, h[i], hd[i])

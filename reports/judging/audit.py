@@ -23,6 +23,7 @@ NUMBERS = ("masses", "gravity", "constants", "q0", "v0")
 FUNCTIONS = ("M", "bias", "H", "lam")
 STATES = 20
 NEWTON = 20
+CANCELS = 1e-4  # part of momentum times speed below which what is left of it is rounding, to the tolerance
 ROUNDED = 1e-12  # part of a gap by which it may miss what was drawn
 SEED = 20240917
 
@@ -64,15 +65,15 @@ def _words(value: Any) -> str:
     return " ".join(f"{x:.6g}" for x in _flat(value))
 
 
-def difference(mine: Any, theirs: Any) -> float:
-    """Max |mine - theirs| / max |theirs|; infinite if names or sizes differ or a value is not finite."""
+def difference(mine: Any, theirs: Any, least: float = 0.0) -> float:
+    """Max |mine - theirs| / max |theirs|, or `least`; infinite if names or sizes differ or a value is not finite."""
     if isinstance(mine, Mapping) and isinstance(theirs, Mapping) and set(mine) != set(theirs):
         return np.inf
     a, b = _flat(mine), _flat(theirs)
     if a.shape != b.shape:
         return np.inf
     worst = float(np.max(np.abs(a - b), initial=0.0))
-    scale = float(np.max(np.abs(b), initial=0.0))
+    scale = float(np.max(np.abs(b), initial=least))
     if not np.isfinite(worst):
         return np.inf
     return worst / scale if scale else worst
@@ -106,6 +107,13 @@ def _entered(case: Case, gap: Any, H: Any, draw: np.random.Generator) -> tuple[F
     return q, np.linalg.lstsq(H(q), rates)[0]
 
 
+def rounded(key: str, theirs: Mapping[str, Any], at: Sequence[tuple[Floats, Floats]]) -> float:
+    """Return what a function is measured by at least: forces that cancel leave rounding of momentum times speed."""
+    if key != "bias" or "M" not in theirs:
+        return 0.0
+    return CANCELS * max(float(np.max(np.abs(np.asarray(theirs["M"](q)) @ v)) * np.max(np.abs(v))) for q, v in at)
+
+
 def _row(
     key: str, mine: Mapping[str, Any], shown: str, theirs: str, value: float, hidden: Mapping[str, str]
 ) -> AuditRow:
@@ -133,7 +141,7 @@ def _function(
         wanted = [(a, right) for a in arguments if np.isfinite(right := _flat(theirs[key](*a))).all()]
         if wanted:  # dependent rows have no one lam
             a, b = np.concatenate([_flat(mine[key](*a)) for a, _ in wanted]), np.concatenate([x for _, x in wanted])
-            worst = difference(a, b)
+            worst = difference(a, b, rounded(key, theirs, at))
     return _row(key, mine, f"{STATES} states", f"{STATES} states", worst, hidden)
 
 

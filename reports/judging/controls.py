@@ -17,9 +17,10 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
 from crossbody.engines.contract import QUANTITIES
 from crossbody.reports import metrics
-from crossbody.reports.judging.audit import audit
+from crossbody.reports.judging.audit import audit, rounded, states
 from crossbody.reports.judging.planted import Range, faults
 from crossbody.reports.judging.truth import agreement
+from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.truth import Truth, taken
 
 SAME = 1e-12
@@ -42,10 +43,10 @@ def unseen(case: Case, truth: Truth, outside: Callable[[str, float], bool]) -> I
         truth: up to where it is trusted.
         outside: whether a number of a metric, off by a fault, is judged as outside wherever it is judged.
     """
-    run = truth.trajectory
+    run = _whole(truth.trajectory)
     if not all(np.isfinite(getattr(run, name)).all() for name in ("t", "q", "v", "gap", "lam", "energy")):
         return
-    known, every = replace(truth, at=recorded(run)), metrics.of(case)
+    known, every = replace(truth, trajectory=run, at=recorded(run)), metrics.of(case)
     held = _held(known, run, case)
     plain: dict[tuple[str, int], float | None] = {}
     blind: set[str] = set()
@@ -62,6 +63,12 @@ def unseen(case: Case, truth: Truth, outside: Callable[[str, float], bool]) -> I
             if not least - own <= found <= most + own or (control.wrong and not outside(name, found)):
                 blind.add(name)
                 yield name, found, (least, most), control.fault
+
+
+def _whole(run: Trajectory) -> Trajectory:
+    """Return a motion in which rows that follow from others carry nothing, as these carry what they would."""
+    known = told(run)
+    return run if known is None or known.all() else replace(run, lam=np.where(known, run.lam, 0.0))
 
 
 def _held(truth: Truth, run: Trajectory, case: Case) -> Set[str]:
@@ -96,7 +103,7 @@ def unheard(case: Case) -> Iterator[Blind]:
         theirs = engines.load("reference").prepare(case, "compiled").audit()
     except CaseUnsupported:
         return
-    asked = [key for key in QUANTITIES if key in theirs and _something(key, theirs[key], case)]
+    asked = [key for key in QUANTITIES if key in theirs and _something(key, theirs, case)]
     large, small = (
         {row.quantity: row for row in audit({key: _times(theirs[key], by) for key in asked}, theirs, case)}
         for by in (1.0 + MORE, 1.0 - MORE)
@@ -121,14 +128,19 @@ def _times(value: Any, by: float) -> Any:
     return by * np.asarray(value, dtype=np.float64)
 
 
-def _something(key: str, value: Any, case: Case) -> bool:
-    """Whether a value, or a function at the start, is other than 0 somewhere."""
+def _something(key: str, theirs: Mapping[str, Any], case: Case) -> bool:
+    """Whether a value, or a function at the start, is other than 0 somewhere, and than rounding."""
+    least = rounded(key, theirs, states(case, theirs)) if key == "bias" else 0.0
+    return _more(key, theirs[key], case, least)
+
+
+def _more(key: str, value: Any, case: Case, least: float) -> bool:
     if isinstance(value, Mapping):
-        return any(_something(key, one, case) for one in value.values())
+        return any(_more(key, one, case, least) for one in value.values())
     if callable(value):
         value = value(case.q0) if key in OF_POSITIONS else value(case.q0, case.v0)
     numbers = np.asarray(value, dtype=np.float64)
-    return bool(np.isfinite(numbers).all() and np.any(numbers))
+    return bool(np.isfinite(numbers).all() and np.any(np.abs(numbers) > least))
 
 
 def recorded(run: Trajectory) -> Callable[[Floats], Trajectory]:

@@ -11,7 +11,7 @@ from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases.defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
-from crossbody.reports.judging.run_verdicts import REACHED, Entry, Judge, audited, finished, value_of, verdicts
+from crossbody.reports.judging.run_verdicts import REACHED, WIDEST, Entry, Judge, audited, finished, value_of, verdicts
 from crossbody.reports.judging.stored import changed, compared_until
 from crossbody.reports.judging.truth_row import of_truth, truth_row
 from crossbody.reports.judging.verdict import Regression, Verdict, Word, exit_code, limit_for
@@ -45,7 +45,12 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
             rows.append(far.judged(name, value if unit == "1" else PART * case.t_end, "", truth, 1.0))
         if name == "position" and not math.isnan(truth.allowed):  # another source that is off so much is no witness
             rows += truth_row(case, replace(truth, agreement={name: value}), command)
-        return all(row.verdict == Word.OUTSIDE for row in rows) or _lets_pass(case, name, value)
+        return (
+            all(row.verdict == Word.OUTSIDE for row in rows)
+            or _lets_pass(case, name, value)
+            or _grown(near, name, value)
+            or (name == "rate_residual" and near.blurred)
+        )
 
     for name, value, (least, most), fault in (
         *unseen(case, truth, outside), *unheard(case), *_unruled(case),
@@ -62,6 +67,8 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
 
 
 WRONG = (Word.OUTSIDE, Word.CRASHED)
+TIMES = ("event_times", "mode_times", "slip_times", "stick_times")
+"""Metrics of instants: a fault of one can be no larger than the time since anything happened before."""
 BESIDE = 1e-3
 """Part of a limit by which a number is beside it."""
 HALF = 0.5
@@ -140,7 +147,8 @@ def _unsaid_of_limits(judge_: Judge) -> Iterator[tuple[str, str]]:
     """Yield limits of which numbers on either side, or none, are not said to be so."""
     for name in dict.fromkeys([*judge_.claims, *(limit.metric for limit in judge_.limits)]):
         claim, limit = judge_.claims.get(name), judge_.limit(name)
-        if name in ("*", "audit") or (limit is None and claim is None) or (limit is not None and limit.known):
+        silent = (limit is None and claim is None) or (limit is not None and limit.known)
+        if name in ("*", "audit") or silent or (name == "rate_residual" and judge_.blurred):
             continue
         expected, most = 0.0 if claim is None else claim.expected, 0.0 if limit is None else limit.value
         beside = BESIDE * (most or abs(expected) or 1.0)
@@ -164,6 +172,13 @@ def _unruled(case: Case) -> Iterator[Blind]:
         value = math.nan if found is None else found.value
         if value != limit.value:
             yield name, value, (limit.value, limit.value), "the limit of the case"
+
+
+def _grown(judge_: Judge, name: str, value: float) -> bool:
+    """Whether a fault in time is no larger than what errors of the tolerance that limits are for grow to here."""
+    limit = limit_for(judge_.limits, name, JUDGED.engine, JUDGED.profile)
+    widest = WIDEST * min(judge_.case.t_end, 1.0)
+    return name in TIMES and limit is not None and value <= min(limit.value * judge_.truth.grows, widest)
 
 
 def _lets_pass(case: Case, name: str, value: float) -> bool:

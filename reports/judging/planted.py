@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.friction import slips
 from crossbody.reports.measuring.truth import taken
 
 if TYPE_CHECKING:
-    from crossbody.reference import System
+    pass
 
 PART = 0.02
 """Part of the largest by which a signal is off: no limit on a motion may be as wide."""
@@ -204,8 +205,10 @@ def gaps(plain: Plain) -> Iterator[Control]:
     """Put the gap of a row off at one sample, or at as many as are not looked at; open what is closed."""
     run, rows = plain.run, plain.normal
     closed = np.flatnonzero(~plain.case.law.unilateral & (plain.case.law.a0 > 0.0))
+    least = TINY * max(1.0, float(np.max(np.abs(run.q))))
     for k in plain.some(rows):
-        some, every = (PART * max(float(np.max(np.abs(gap))), RESTS) for gap in (run.gap[:, rows], run.gap))
+        some = PART * max(float(np.max(np.abs(run.gap[:, rows]))), RESTS, least)
+        every = PART * max(float(np.max(np.abs(run.gap))), least)
         own, wide = float(np.max(np.abs(run.gap[:, k]))), -(-len(run.t) // LOOKED)
         most = (1.0 + SLACK) * some / own if own > 0.0 else np.inf  # its bodies may be farther than it ever opens
         for i, sign in plain.both():
@@ -255,24 +258,69 @@ def energies(plain: Plain) -> Iterator[Control]:
 
 FORCED = {2.0: "doubled", 0.0: "left out"}
 """Factors on all forces."""
+WEAK = 3e-3
+"""Part of the force that moves a mechanism below which what its rows carry is not what their errors are measured by."""
 
 
 def forces(plain: Plain) -> Iterator[Control]:
     """Double all multipliers and impulses, or leave them out; put one off, to where it pulls, or pushes at nothing."""
-    run, rows = plain.run, plain.normal
+    run = plain.run
     largest = float(np.max(np.abs(run.lam), initial=0.0))
     if not largest > RESTS and not any(event.impulse for event in run.events):
+        return
+    least = WEAK * _moving(run)
+    yield from _impulses(plain, least)
+    if not largest > RESTS:
+        return
+    yield from _laws(plain, least)
+    k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
+    for i, sign in plain.both() if largest > least else ():
+        one = plain.off("lam", (i, k), sign * MUCH * largest)
+        yield Control(fault="a multiplier off at one sample", run=one, sees={"lam_error": exactly(MUCH)})
+    yield from _pulling(plain)
+
+
+def _moving(run: Trajectory) -> float:
+    """Return the force, N, that moves a mechanism: the energy that turns over, over its way."""
+    way = float(np.max(np.ptp(run.q, axis=0), initial=0.0))
+    return max(float(run.energy[:, 0].max()), float(np.ptp(run.energy[:, 1]))) / way if way > 0.0 else 0.0
+
+
+def _impulses(plain: Plain, least: float) -> Iterator[Control]:
+    """Put all impulses off; where rows carry less than `least`, N, let one carry what moves the mechanism."""
+    run, seen = plain.run, ("lam_impulse_path", "lam_impulse")
+    if float(np.max(np.abs(np.trapezoid(run.lam, run.t, axis=0)), initial=0.0)) < least * float(np.ptp(run.t)):
+        pressed = _pressed(run, least / WEAK)
+        yield Control(fault=f"a row presses by {least / WEAK:.3g} more", run=pressed, sees=dict.fromkeys(seen, LARGE))
         return
     for times, said in FORCED.items():
         events = tuple(replace(event, impulse=times * event.impulse) for event in run.events)
         yield Control(
             fault=f"multipliers and impulses {said}", run=replace(run, lam=times * run.lam, events=events),
-            sees=dict.fromkeys(("lam_impulse_path", "lam_impulse"), roughly(1.0)),
+            sees=dict.fromkeys(seen, roughly(1.0)),
         )  # fmt: skip
-    if not largest > RESTS:
-        return
-    few = taken(run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
+
+
+LARGE = (1.0 / ROUGH, np.inf)
+"""Range of what is as large as what it is measured by, or far larger."""
+
+
+def _pressed(run: Trajectory, more: float) -> Trajectory:
+    """Return a motion whose row that carries most carries more, N, throughout."""
+    k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
+    return _with(run, "lam", (slice(None), k), run.lam[:, k] + more)
+
+
+def _laws(plain: Plain, least: float) -> Iterator[Control]:
+    """Put multipliers off the law, at all of a few samples and at one."""
+    few = taken(plain.run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
     at = tuple(np.unravel_index(np.argmax(np.abs(few.lam)), few.lam.shape))
+    if np.abs(few.lam[at]) < least:
+        more, said = _pressed(few, least / WEAK), f"a row presses by {least / WEAK:.3g} more"
+        yield Control(fault=said, run=more, sees={"law_residual": LARGE}, plain=few)
+        return
+    if not _acts(plain.case, few, int(at[0]), int(at[1])):
+        return
     for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
         other = replace(few, lam=times * few.lam)
         yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": roughly(1.0)}, plain=few)
@@ -282,10 +330,21 @@ def forces(plain: Plain) -> Iterator[Control]:
             fault=f"the largest multiplier {sign * MUCH:g} off at one sample", run=one, sees={"law_residual": seen},
             plain=few,
         )  # fmt: skip
-    k = int(np.argmax(np.max(np.abs(run.lam), axis=0)))
-    for i, sign in plain.both():
-        one = plain.off("lam", (i, k), sign * MUCH * largest)
-        yield Control(fault="a multiplier off at one sample", run=one, sees={"lam_error": exactly(MUCH)})
+
+
+def _acts(case: Case, run: Trajectory, i: int, row: int) -> bool:
+    """Whether multipliers, and that of a row at a sample, move anything: at a dead centre no law tells them."""
+    if (system := equations(case)) is None:
+        return False
+    H = system.equations_along(run.t, run.q, run.v)[2]
+    pushed, largest = np.einsum("mkn,mk->mn", H, run.lam), float(np.max(np.abs(H), initial=0.0))
+    all_, own = float(np.max(np.abs(pushed), initial=0.0)), float(np.max(np.abs(H[i, row]), initial=0.0))
+    return all_ > WEAK * largest * float(np.max(np.abs(run.lam))) and own > WEAK * largest
+
+
+def _pulling(plain: Plain) -> Iterator[Control]:
+    """Let rows that open pull, or push at nothing, at one sample."""
+    run, rows = plain.run, plain.normal
     most = PART * float(np.max(np.abs(run.lam[:, rows]), initial=0.0))
     wrong = {"pulls": (-most, np.isin(run.mode, PUSHES)), "pushes at nothing": (most, run.mode == Mode.FREE)}
     for k in plain.some(rows) if most > 0.0 else ():
@@ -340,10 +399,8 @@ def modes(plain: Plain) -> Iterator[Control]:
 
 def _slips(plain: Plain, i: int, way: slice) -> bool:
     """Whether a place slips at a sample with at least a part of the fastest coordinate's speed."""
-    system, run = equations(plain.case), plain.run
-    if system is None:
-        return False
-    slip = float(np.linalg.norm(_rates(system, run.q[i], run.v[i])[way]))
+    run = plain.run
+    slip = float(np.linalg.norm(slips(plain.case, taken(run, np.array([i])))[0, way]))
     return slip > TENTH * float(np.max(np.abs(run.v)))
 
 
@@ -437,15 +494,15 @@ def switched(plain: Plain) -> Iterator[Control]:
 def _shows(plain: Plain, event: Event, t: float) -> bool:
     """Whether at an instant before a change slip, or what friction is below its bound, is far from none."""
     run, (rows, ways, bound) = plain.run, _bounds(plain.case, plain.run)
-    if (system := equations(plain.case)) is None or event.contact not in rows:
+    if event.contact not in rows:
         return False
     k, i = int(np.searchsorted(rows, event.contact)), int(np.searchsorted(run.t, t))
     if event.after == Mode.SLIP:
         below = np.abs(bound[:, k] - np.linalg.norm(run.lam[:, ways[k]], axis=1))
         return bool(below[i] > FAR * float(bound[:, k].max()))
-    some = [i, *range(0, len(run.t), -(-len(run.t) // FEW))]
-    slips = [float(np.linalg.norm(_rates(system, run.q[j], run.v[j])[ways[k]])) for j in some]
-    return slips[0] > FAR * max(slips)
+    rates = slips(plain.case, taken(run, np.array([i, *range(0, len(run.t), -(-len(run.t) // FEW))])))[:, ways[k]]
+    speeds = np.linalg.norm(rates, axis=1)
+    return bool(speeds[0] > FAR * speeds.max())
 
 
 def clocks(plain: Plain) -> Iterator[Control]:
@@ -502,7 +559,7 @@ def _cumulated(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
         return
     row = ways[int(plain.draw.integers(len(ways)))].start
     force = float(np.max(np.abs(run.lam))) * plain.draw.uniform(-1.0, 1.0, len(run.t))
-    slip = np.array([_rates(system, q, v)[row] for q, v in zip(run.q, run.v, strict=True)])
+    slip = slips(plain.case, run)[:, row]
     sees = {}
     for name, power in (("friction_impulse", force), ("friction_work", force * slip)):
         sums = np.append(0.0, np.cumsum([0.5 * (run.t[i + 1] - run.t[i]) * (power[i] + power[i + 1])
@@ -518,16 +575,10 @@ def _creeping(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
     if system is None or not ways:
         return
     v = run.v[-1] + PART * plain.draw.normal(size=run.v.shape[1])
-    rates = _rates(system, run.q[-1], v)
-    fastest = max(float(np.linalg.norm(rates[way])) for way in ways)
     moving = replace(run, v=np.concatenate([run.v[:-1], [v]]))
+    rates = slips(plain.case, moving)[-1]
+    fastest = max(float(np.linalg.norm(rates[way])) for way in ways)
     yield Control(fault="what holds moves", run=moving, plain=run, sees={"creep_speed": exactly(fastest)})
-
-
-def _rates(system: System, q: Floats, v: Floats) -> Floats:
-    """Return the rates of all rows (nc,) against what their surfaces do by themselves."""
-    rates: Floats = system.gap(q, v)[1] - np.asarray(system.drift, dtype=np.float64)
-    return rates
 
 
 def _bounds(case: Case, run: Trajectory) -> tuple[NDArray[np.intp], list[slice], Floats]:

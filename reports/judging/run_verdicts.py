@@ -6,6 +6,7 @@ import math
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
@@ -166,11 +167,23 @@ class Judge:
         stated = 0.0 if limit is None else limit.value
         return self.looser > LOOSEST or (stated < WIDEST < stated * self.looser)
 
+    @cached_property
+    def blurred(self) -> bool:
+        """Whether the truth's own samples are too far apart for rates that change as fast as those of stiff rows."""
+        limit = self.limit("rate_residual")
+        own = metrics.load("rate_residual").measure(self.truth, self.truth.trajectory, self.case)
+        return limit is not None and own is not None and own > limit.value
+
     def told(self, metric: str, word: Word, why: str) -> tuple[Word, str]:
         """What is said of a number: one outside is not judged where a tolerance was asked for that hides any fault."""
         stands = metric in EXACT or metric == "law_residual"
         if word is Word.OUTSIDE and metric == "rate_residual" and self.looser > 1.0:
             return Word.INFO, "At the requested tolerance its samples are too far apart."
+        if word is Word.OUTSIDE and metric == "rate_residual" and self.blurred:
+            return (
+                Word.INFO,
+                "Rates change between samples: those of the truth do not tell its own way.",
+            )
         if word is not Word.OUTSIDE or stands or not self.hides():
             return word, why
         return Word.INFO, "The requested tolerance allows errors as large as those of a fault."

@@ -132,7 +132,7 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
         if rubs and isinstance(found, Trajectory) and not (found.outcome.ok or found.outcome is first.outcome):
             found = f"CVODE ends {found.outcome.value} at t = {found.t[-1]:.4g} s"
         if isinstance(found, str):
-            return _integrated(case, first, "compiled", f" ({found})")
+            return _integrated(case, first, "compiled", f" ({found})", budget)
         second = found
     t, grown = _growing(case, dense, at, budget)
     truth = Truth(

@@ -65,13 +65,27 @@ def rubbed(run: Trajectory, case: Case) -> Rubbing | None:
     ways = np.arange(count.max())
     there = (ways < count).astype(float)
     tangents = system.tangent[rows][:, None] + np.minimum(ways, count - 1)
-    rates: Floats = np.array([system.gap(q, v)[1] for q, v in zip(run.q, run.v, strict=True)])
-    rates -= np.asarray(system.drift, dtype=np.float64)
+    rates = slips(case, run)
     return Rubbing(
         rows=rows, pair=_pairs(case, len(rows)), mu=system.friction[rows], slip=there * rates[:, tangents],
         force=there * run.lam[:, tangents], normal=np.where(system.dry[rows], 1.0, run.lam[:, rows]),
         dry=system.dry[rows],
     )  # fmt: skip
+
+
+def slips(case: Case, run: Trajectory) -> Floats:
+    """Return the rates of all rows (n, nc) against what their surfaces do by themselves.
+
+    Where discrete variables choose the places of contacts, those of the case's start count until one of them changes.
+    """
+    system = equations(case)
+    assert system is not None
+    rates: Floats = system.gaps_along(run.q, run.v)[1]
+    if system.jumps:
+        until = min((one.t for one in run.switches if one.t > 0.0 and not one.smooth), default=np.inf)
+        count = int(np.searchsorted(run.t, until, side="right"))
+        rates[:count] = system.gaps_along(run.q[:count], run.v[:count], system.begun(case.q0, case.v0))[1]
+    return rates - np.asarray(system.drift, dtype=np.float64)
 
 
 def _pairs(case: Case, count: int) -> NDArray[np.intp]:

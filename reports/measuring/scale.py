@@ -12,8 +12,9 @@ from crossbody.cases.arrays import Floats
 RESTS = 1e-4
 """Coordinates of one unit that all stay below this, in SI, rest: what is left of their motion is known to
 absolute tolerances alone. Those are 1e-12 by default, so a relative 1e-6 of this is a hundred of them."""
-
-
+ROUNDING = 1e-6
+"""Part of the largest coordinate, or of a metre: gaps that never open beyond it are known to its tolerance alone,
+and on those below it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
 IDLE = 1e-3
 """Part of the forces that move a mechanism below which its rows carry nothing but noise."""
 KNOWN = 1e-8
@@ -44,6 +45,15 @@ def least(named: Sequence[Coordinate], rates: bool = False) -> Floats:
     """What coordinates, or their rates, are measured by at least (n,), SI."""
     known = [coordinate.rate if rates else coordinate.size for coordinate in named]
     return np.maximum(of_like(np.array(known), named), RESTS)
+
+
+def rounded(q: Floats) -> float:
+    """Return what gaps are measured by at least, m or rad: coordinates may all be zero where lengths are not.
+
+    Args:
+        q: of a motion (n, nq).
+    """
+    return ROUNDING * max(1.0, float(np.max(np.abs(q), initial=0.0)))
 
 
 def idle(run: Trajectory) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,11 @@ from crossbody.cases.contacts import CLOSED, Contact, contacts, rates
 from crossbody.reports.measuring.alignment import aligned, matched
 from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import SLOW, guard, rubbing, turned
-from crossbody.reports.measuring.impulse import away
+from crossbody.reports.measuring.impulse import away, told
 from crossbody.reports.measuring.instants import off
+from crossbody.reports.measuring.scale import rounded
 from crossbody.reports.measuring.truth import Truth
-from crossbody.reports.metrics.position import ROUNDING, gap_scale_of
+from crossbody.reports.metrics.position import gap_scale_of
 
 UNITS = {
     "constraint_drift": "m", "event_times": "s", "mode_times": "s", "penetration": "m",
@@ -96,8 +98,8 @@ def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
 def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Recorded gaps against those of the recorded positions, over the largest: an identity at every sample.
 
-    Max |gap - gap(q)| / max |gap(q)|, at most 400 samples. None without rows, where gaps depend on discrete
-    variables, and where the case has no equations.
+    Max |gap - gap(q)| / max |gap(q)|, or what rounding leaves of gaps is measured by, at most 400 samples. None without
+    rows, where gaps depend on discrete variables, and where the case has no equations.
     """
     system = equations(case)
     if system is None or not run.gap.shape[1] or system.jumps:
@@ -106,9 +108,7 @@ def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     some = spread(run)
     wanted = system.gaps_along(run.q[some], 0.0 * run.v[some])[0]
-    scale = max(float(np.max(np.abs(wanted))), ROUNDING * float(np.max(np.abs(run.q[some]))))
-    apart = float(np.max(np.abs(run.gap[some] - wanted)))
-    return apart / scale if scale else apart
+    return float(np.max(np.abs(run.gap[some] - wanted))) / max(float(np.max(np.abs(wanted))), rounded(run.q[some]))
 
 
 def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -119,12 +119,14 @@ def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None
     one is above by as much and bears nothing; at which friction is called SLIP below half its bound, STICK beyond one
     and a half times it (pyramids in and around a cone of friction are within the root of two), or STICK at its bound
     while it slips. Samples beside events are left out: a step has the force of either side. It asks nothing of the
-    truth or the law. None without rows and where modes are not known, NaN where lam is not.
+    truth or the law. None without rows and where modes are not known, NaN where lam is not; rows that are always on
+    and follow from others have none.
     """
     if not run.mode.size or (run.mode < 0).any() or len(run.t) < 2:
         return None
-    if np.isnan(run.lam).any():
+    if (known := told(run)) is None:
         return math.nan
+    run = replace(run, lam=np.where(known, run.lam, 0.0))
     quiet, light = _between_events(run), KNOWN * float(np.max(np.abs(run.lam)))
     rows = case.law.unilateral
     mode, gap, bears = run.mode[:, rows], run.gap[:, rows], np.abs(run.lam[:, rows]) > light

@@ -157,5 +157,5 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
             continue
         lam, moving = multipliers(system, case, run, at, rows, np.flatnonzero(sliding), fast, inputs)
         worst = max(worst, float(np.max(np.abs(_times(moving, run.lam[np.ix_(at, rows)] - lam)))))
-        scale = max(scale, float(np.max(np.abs(lam))))
+        scale = max(scale, float(np.max(np.abs(_times(moving, lam)))))
     return worst / max(scale, idle(truth.trajectory)) if scale else None

@@ -10,14 +10,11 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.scale import least, of_like
+from crossbody.reports.measuring.scale import RESTS, least, of_like, rounded
 from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False
-ROUNDING = 1e-6
-"""Part of the largest coordinate: gaps that never open beyond it are known to its tolerance alone,
-and on those below it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
 FEW = 20
 """Samples at which it is asked by how much gaps change with positions."""
 SMALL, STILL = 1e-6, 1e-9  # a coordinate that moves less than this part of its like rests
@@ -91,11 +88,13 @@ def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:
 
     motion, system = truth.trajectory, equations(case)
     own: Floats = np.max(np.abs(motion.gap[:, rows]), axis=0, initial=0.0)
-    widest = max(float(own.max()), ROUNDING * float(np.max(np.abs(motion.q), initial=0.0)))
+    if not (own.any() or motion.q.any()):  # errors are absolute where a closed form rests exactly
+        return own
+    most = max(float(own.max()), rounded(motion.q), RESTS)
     if system is None or system.jumps:
-        return np.full(own.shape, widest)
+        return np.full(own.shape, most)
     some = spread(motion)[:: -(-SAMPLES // FEW)]
     slopes = np.abs(system.equations_along(motion.t[some], motion.q[some], motion.v[some])[2][:, rows])
     sizes = np.delete(scale_of(motion, case), [at + 3 for at in case.quaternions])
     known: Floats = np.max(slopes * sizes, axis=(0, 2))
-    return np.maximum(own, np.minimum(known, widest))
+    return np.maximum(own, np.minimum(known, most))

@@ -109,9 +109,10 @@ def _motion(blocks: Mapping[str, Floats], prefix: str = "") -> Trajectory:
 
 
 def _ledger(blocks: Mapping[str, Floats]) -> Ledger | None:
-    if "work" not in blocks:
+    if "input" not in blocks:
         return None
-    return Ledger(contact=blocks["work"], input=blocks["input"][:, 0], dissipated=blocks["loss"][:, 0])
+    none = np.zeros((len(blocks["input"]), 0))  # of a motion without rows
+    return Ledger(contact=blocks.get("work", none), input=blocks["input"][:, 0], dissipated=blocks["loss"][:, 0])
 
 
 def _event(t: float, contact: int, before: int, after: int, impulse: float = 0.0) -> Event:

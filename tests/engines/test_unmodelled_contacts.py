@@ -131,3 +131,21 @@ def test_an_equilibrium_of_a_file_rests_on_contacts_that_slide(
     path.write_text(BOX.format(height=0.1, condim=4), encoding="utf-8")
     analyse(str(path), None, [], [], bode=False, locus=None, mapped=False, out=None, command="")
     assert "have no rows" in " ".join(capsys.readouterr().err.split())
+
+
+HULL = """<mujoco><asset><mesh name="m" vertex="-.1 -.1 -.1 .1 -.1 -.1 0 .1 -.1 0 0 .1"/></asset><worldbody>
+  <geom name="floor" type="plane" size="1 1 1"/>
+  <body pos="0 0 .1"><geom name="table" type="box" size=".5 .5 .1"/></body>
+  <body pos="0 0 .32"><freejoint/><geom name="hull" type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+
+
+def test_an_equilibrium_is_not_silent_on_shapes_whose_gap_nobody_knows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It lies inside of the table."""
+    path = tmp_path / "hull.xml"
+    path.write_text(HULL, encoding="utf-8")
+    analyse(str(path), None, [], [], bode=False, locus=None, mapped=False, out=None, command="")
+    told = " ".join(capsys.readouterr().err.split())
+    assert "'hull' and 'table' have no rows and pass through each other" in told
+    assert "the gap between a box and a hull is not implemented" in told

@@ -151,16 +151,27 @@ class Fall:
         spin = self.turning(0.0) + self.struck * a / self.inertia
         return min(2.0 * min(up) / p["gravity"], math.atan2(b, a) / abs(spin))
 
-    @property
+    @cached_property
+    def caught_arc(self) -> LinearArc:
+        """Gap of the left corner in its COLLISION, from the first touch on."""
+        return LinearArc(self.p["b0"], 2.0 * self.p["zeta3"] * math.sqrt(self.p["b0"]), 0.0, -self.speed)
+
+    @cached_property
     def settling(self) -> float:
         """Time from the first touch until the left corner hands over to CONTACT, s; infinite if later than level."""
-        p = self.p
-        arc = LinearArc(p["b0"], 2.0 * p["zeta3"] * math.sqrt(p["b0"]), 0.0, -self.speed)
+        arc = self.caught_arc
         t = np.linspace(0.0, self.rotation, 20001)
         damped, sprung = arc.a1 * arc.rate(t), arc.a0 * arc(t)
         press = self.press(self.tilt, self.spin)
         spent = np.abs(damped) + np.abs(sprung) <= SPENT * (press - damped - sprung)
         return float(t[np.argmax(spent)]) if spent.any() else math.inf
+
+    @property
+    def rising(self) -> float:
+        """Rate of the left corner's gap in CONTACT when the right one lands, m/s."""
+        at = self.settling
+        arc = LinearArc(self.p["a0"], self.p["a1"], float(self.caught_arc(at)), float(self.caught_arc.rate(at)))
+        return float(arc.rate(self.rotation - at))
 
     @property
     def recoil(self) -> float:
@@ -195,6 +206,8 @@ def _broken(p: Mapping[str, float], frozen: bool) -> Iterator[str]:
         yield f"the left corner bounces: it comes at {fall.speed:.3g} m/s, and below {threshold:.3g} m/s it is caught"
     if not frozen and not fall.settling < fall.rotation:
         yield f"the left corner has not settled when the right one lands {fall.rotation:.3g} s later"
+    elif not frozen and fall.rising < 0.0:
+        yield "the left corner still comes down when the right one lands: it is struck again, and not let go"
     rest, arm = fall.press(0.0, fall.turning(0.0)), p["mass"] * a * a
     if not rest > 0.0:
         yield "the left corner takes off before the right one lands: the box turns too fast"
