@@ -28,7 +28,6 @@ from crossbody.reference.core.algebra import ULP, all_finite, copy
 from crossbody.reference.core.friction import NOTHING, RENEW, ask
 from crossbody.reference.core.holding import MOVED
 from crossbody.reference.core.layout import (
-    BALLISTIC,
     DONE,
     EVENTS_FULL,
     EXACT,
@@ -56,13 +55,11 @@ from crossbody.reference.core.layout import (
     open_model,
     open_work,
 )
-from crossbody.reference.core.machine import known
 from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
 STILL = 4096.0  # units of rounding by which time does not go on: before a jam contacts switch ever sooner
-CLEARLY, LEAST = 1.5, 1e-3  # times as long as a gap takes at its rate to come out of its surface, or of another step
 SHORTER = 0.1  # the least part of a step that is taken anew, wherever in it something fires
 
 
@@ -102,18 +99,8 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     peaks.forget(s, w, b.mode)
     s.method = EXPLICIT
     s.stalled, s.hold, s.full_jacobian = 0, 0, 0
-    s.h = _until_clear(s, w, b, s.h_active if s.na > 0 else s.h_free)
+    s.h = s.h_active if s.na > 0 else s.h_free
     return ILL_POSED if s.loops and folds.begin(K, s, m, w) != 0 else 0
-
-
-@compiled
-def _until_clear(s: Any, w: Work, b: Buffers, h: float) -> float:
-    """No longer a step than h, or in which what was let go below its surface comes out: a longer one is cut there."""
-    first = np.inf
-    for i in range(s.nc):
-        if b.mode[i] == BALLISTIC and w.gap[i] < -known(s, w) and w.rate[i] > 0.0:
-            first = min(first, -w.gap[i] / w.rate[i])
-    return float(min(h, max(CLEARLY * first, LEAST * h)))
 
 
 @compiled

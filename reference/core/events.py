@@ -258,7 +258,7 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             return TOO_LONG
         if s.frictional:
             _stop_first(K, s, m, w, mode)
-            if s.theta <= 1.0 and ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0:
+            if ask(TURNS_ASIDE, s, m, w, NOTHING) > 0.0:
                 s.theta *= BEFORE_IT
                 return TOO_LONG
     return 0
@@ -286,27 +286,17 @@ def _look_at(K: Any, s: Any, m: Model, w: Work, theta: float) -> None:
 
 @compiled
 def _stop_first(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> None:
-    """Pass over what lets go or breaks loose where another slip turns as it dies out; that one stops if it can.
+    """Let contacts stop whose slips turn as they die out, in place of what lets go or breaks loose beside them.
 
     As a slip turns through zero forces jump, for a time that is none: what follows from that no motion does. Which
     contacts go on is decided for all of them together, as at any stop.
     """
-    doubted = True
-    while doubted and s.theta <= 1.0:
-        _look_at(K, s, m, w, s.theta)
-        doubted, first = False, NEVER
-        for i in range(s.nc):
-            if m.tangents[i] > 1 and mode[i] == SLIP and dies_out(s, m, w, i):
-                for k in range(s.nc):
-                    if k != i and w.hit[k] <= s.theta and w.kind[k] in (CONE, RELEASE):
-                        w.hit[k], doubted = NEVER, True
-                if doubted and stops_too(s, m, w, mode, i):
-                    w.hit[i], w.kind[i] = s.theta, STOP
-        for k in range(s.nc):
-            first = min(first, w.hit[k])
-        for k in range(s.ng):
-            first = min(first, w.guard_hit[k])
-        s.theta = first
+    _look_at(K, s, m, w, s.theta)
+    for i in range(s.nc):
+        if m.tangents[i] > 1 and mode[i] == SLIP and dies_out(s, m, w, i):
+            for k in range(s.nc):
+                if k != i and w.hit[k] <= s.theta and w.kind[k] in (CONE, RELEASE):
+                    w.hit[k], w.hit[i], w.kind[i] = NEVER, s.theta, STOP
 
 
 @compiled
