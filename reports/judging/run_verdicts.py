@@ -52,6 +52,8 @@ LOOSEST = 1e3
 """So many times the tolerance that limits are for widen them at most: beyond, an error may be as large as a fault's."""
 EXACT = IDENTITIES - GROWING | {"energy_residual", "gap_residual"}
 """Metrics of a run against itself: neither a tolerance nor a horizon widens their limits."""
+TINY = 1e-300
+"""In place of a tolerance of an audit that is zero: any difference is beyond it."""
 SUM = 1e-9
 """To which part of it the parts of an error add up to it."""
 LARGEST = "largest"
@@ -309,7 +311,7 @@ def _defaults(judge_: Judge) -> Iterator[Verdict]:
 def audited(judge_: Judge) -> Verdict:
     """A failed audit is a result, not a comparison: unless it is a known property, no metric follows it."""
     failed = [row for row in judge_.entry.audit if not row.ok]
-    shown = [row.difference for row in judge_.entry.audit if not math.isnan(row.difference)]
+    shown = [row for row in judge_.entry.audit if not math.isnan(row.difference)]
     limit = judge_.limit("audit")
     if not failed:
         word, why = Word.WITHIN, "the same physics as the reference"
@@ -317,9 +319,8 @@ def audited(judge_: Judge) -> Verdict:
         word, why = Word.EXPECTED, limit.known
     else:
         word, why = Word.OUTSIDE, "Not compared: " + ", ".join(row.quantity for row in failed) + " differ."
-    worst = max(failed, key=lambda row: row.difference) if failed else None
-    value = worst.difference if worst else max(shown, default=0.0)
-    tolerance = worst.tolerance if worst else judge_.entry.audit[0].tolerance
+    worst = max(failed or shown, key=lambda row: row.difference / max(row.tolerance, TINY), default=None)
+    value, tolerance = (worst.difference, worst.tolerance) if worst else (0.0, judge_.entry.audit[0].tolerance)
     return judge_.row("audit", value, "1", word, why, limit=tolerance, tier="")
 
 

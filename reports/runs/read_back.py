@@ -178,6 +178,10 @@ def _error(found: Trace, first: Trace, result: CaseResult, judged: float) -> Ite
     """
     if found.truth is None or result.truth.trusted < result.truth.trajectory.t[-1]:
         return
+    if not np.isfinite(found.run.q).all():
+        if math.isfinite(judged):
+            yield f"its position, which is not finite, while its error was judged as {judged:g}"
+        return
     off = np.nanmax(np.abs(found.run.q - found.truth.q), axis=0) / np.array(first.about["scales"])
     if not abs(float(np.max(off)) - judged) <= SAME * judged:
         yield f"its error of position, {np.max(off):g}, not {judged:g}"

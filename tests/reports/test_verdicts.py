@@ -352,6 +352,15 @@ def test_the_same_physics_passes_the_audit(case: Case) -> None:
     assert all(row.ok for row in audit(PHYSICS, PHYSICS, case))
 
 
+@pytest.mark.parametrize("other", [0.2, 0.8])
+def test_the_audit_shows_what_comes_nearest_to_its_own_tolerance(case: Case, motion: Trajectory, other: float) -> None:
+    near = AuditRow(quantity="touches", mine="", theirs="", difference=other, tolerance=1.0)
+    rows = (AuditRow(quantity="masses", mine="", theirs="", difference=5e-11, tolerance=1e-10), near)
+    table = compare(case, [Entry(engine="fake", profile="other", run=motion, audit=rows)])
+    shown = table[(table["engine"] == "fake") & (table["metric"] == "audit")].iloc[0]
+    assert (shown["value"], shown["limit"]) == ((5e-11, 1e-10) if other < 0.5 else (0.8, 1.0))
+
+
 @pytest.mark.parametrize(
     ("key", "value"),
     [
