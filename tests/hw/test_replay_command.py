@@ -63,7 +63,7 @@ def test_replay_writes_the_report_with_the_measurement_in_it(
     case = next(out.glob("case-*.html")).read_text(encoding="utf-8")
     assert '<option value="all" selected>' in case  # nothing is judged: every number is shown
     heads = re.findall(r"<h2>([^<]*)", case)
-    assert heads == ["At a glance", "Verdicts", "Motion", "Runs", "Parity audit", "Provenance"]
+    assert heads == ["At a glance", "Verdicts", "Motion", "Runs", "Provenance"]
 
 
 @needs_pendulum

@@ -132,9 +132,12 @@ def test_softer_harder_and_livelier_contacts_solve_the_maze_at_the_same_times(a0
 
 @pytest.mark.parametrize("zeta", [0.1, 0.2])
 def test_a_rebound_into_the_ring_above_loses_the_ball(zeta):
-    """e is above the 0.33 that the channel's clearance allows; the first drop is the last that goes well."""
+    """e is above the 0.33 that the channel's clearance allows; the first drop is the last that goes well.
+
+    Each rebound makes errors grow: at 1e-8 when the ball is lost depends on the tolerance by seconds, at 1e-9 by .2 s.
+    """
     a1 = 2000.0 * zeta
-    motion = solved(a1=a1, a1_slip=a1)
+    motion = solved(rtol=1e-10, a1=a1, a1_slip=a1)
     limit = math.sqrt(2.0 * 0.855 * 2.3e-3) / 0.186  # up to it a ball that lands so fast does not reach the ring above
     assert cf.restitution(zeta) > limit == pytest.approx(0.33, abs=0.01)
     assert motion.outcome is Outcome.LOST

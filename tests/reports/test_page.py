@@ -24,6 +24,7 @@ from crossbody.cases import OutputError, load
 from crossbody.reports.bench.order import observed_order
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
 from crossbody.reports.figures.styles import COLOURS, DASHES, style
+from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.told import share
 from crossbody.reports.judging.truth import truth_of
@@ -630,7 +631,8 @@ def test_steps_of_a_run_begin_where_the_one_before_ended(count: int) -> None:
     t = np.repeat(np.cumsum(rng.uniform(1e-3, 1.0, count)), rng.integers(1, 3, count))
     case = load("bouncing_ball", "linear")
     truth = truth_of(case)
-    steps = study._trace(case, Entry(engine="reference", profile="compiled", run=truth.trajectory, stepped=t), truth)
+    clock = Clock(run=replace(truth.trajectory, t=t), around_s=1.0, compiled_s=0.0)
+    steps = study._trace(case, Entry(engine="reference", profile="compiled", run=truth.trajectory, clock=clock), truth)
     starts, lengths = (np.array(part) for part in steps.about["steps"])
     behind = dict(zip(np.unique(t)[:-1].tolist(), np.diff(np.unique(t)).tolist(), strict=True))
     assert [behind[start] for start in starts.tolist()] == lengths.tolist()
