@@ -11,6 +11,8 @@ from dataclasses import replace
 from html import escape, unescape
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
@@ -631,7 +633,8 @@ def test_steps_of_a_run_begin_where_the_one_before_ended(count: int) -> None:
     t = np.repeat(np.cumsum(rng.uniform(1e-3, 1.0, count)), rng.integers(1, 3, count))
     case = load("bouncing_ball", "linear")
     truth = truth_of(case)
-    clock = Clock(run=replace(truth.trajectory, t=t), around_s=1.0, compiled_s=0.0)
+    own: Any = SimpleNamespace(t=t)
+    clock = Clock(run=own, around_s=1.0, compiled_s=0.0)
     steps = study._trace(case, Entry(engine="reference", profile="compiled", run=truth.trajectory, clock=clock), truth)
     starts, lengths = (np.array(part) for part in steps.about["steps"])
     behind = dict(zip(np.unique(t)[:-1].tolist(), np.diff(np.unique(t)).tolist(), strict=True))
