@@ -10,11 +10,13 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.scale import RESTS, least, of_like, rounded
+from crossbody.reports.measuring.scale import RESTS, ROUNDING, least, of_like, rounded
 from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
 CLAIMED = False
+ROUNDED = 1e-3
+"""Coordinates below this, m or rad, are those of a mechanism that stands in its reference pose."""
 FEW = 20
 """Samples at which it is asked by how much gaps change with positions."""
 SMALL, STILL = 1e-6, 1e-9  # a coordinate that moves less than this part of its like rests
@@ -90,7 +92,9 @@ def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:
     own: Floats = np.max(np.abs(motion.gap[:, rows]), axis=0, initial=0.0)
     if not (own.any() or motion.q.any()):  # errors are absolute where a closed form rests exactly
         return own
-    most = max(float(own.max()), rounded(motion.q), RESTS)
+    most = max(float(own.max()), ROUNDING * float(np.max(np.abs(motion.q))))
+    if most < ROUNDED * ROUNDING:  # nor do coordinates near zero tell how large the mechanism is
+        most = max(rounded(motion.q), RESTS)
     if system is None or system.jumps:
         return np.full(own.shape, most)
     some = spread(motion)[:: -(-SAMPLES // FEW)]
