@@ -278,20 +278,14 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
 
 
 @compiled
-def _look_at(K: Any, s: Any, m: Model, w: Work, theta: float) -> None:
-    """Leave in w.gap and w.rate those at the part theta of the step."""
-    dense.state(s, m, w, theta, w.ys)
-    K.gaps(s.t_old + theta * s.hs, w.ys[: s.nq], w.ys[s.nq :], m.p, w.gap, w.rate)
-
-
-@compiled
 def _stop_first(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> None:
     """Let contacts stop whose slips turn as they die out, in place of what lets go or breaks loose beside them.
 
     As a slip turns through zero forces jump, for a time that is none: what follows from that no motion does. Which
-    contacts go on is decided for all of them together, as at any stop.
+    contacts go on is decided for all of them together, as at any stop. Leaves gaps and rates at s.theta in w.
     """
-    _look_at(K, s, m, w, s.theta)
+    dense.state(s, m, w, s.theta, w.ys)
+    K.gaps(s.t_old + s.theta * s.hs, w.ys[: s.nq], w.ys[s.nq :], m.p, w.gap, w.rate)
     for i in range(s.nc):
         if m.tangents[i] > 1 and mode[i] == SLIP and dies_out(s, m, w, i):
             for k in range(s.nc):

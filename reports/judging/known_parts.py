@@ -100,13 +100,18 @@ def _unlike(
             yield part_of(name, part), told, (0.0, SAME), "what an error of known parts is known to"
 
 
-def _parts(errors: Errors, by: float, read: float = 0.0) -> tuple[dict[str, float], dict[str, float]]:
-    """Return part -> its share of the whole where that is largest, and its largest."""
-    parts = {"model": errors.a, "step": by * errors.b} | ({"importer": errors.c} if read else {})
+def _laid(parts: Mapping[str, Floats]) -> tuple[dict[str, float], dict[str, float]]:
+    """Return part -> its share of the whole where that is largest, and its largest, of parts at the same places."""
     whole = np.sum(list(parts.values()), axis=0)
     worst = int(np.argmax(np.abs(whole)))
     there = {part: float(np.sign(whole[worst]) * error[worst]) for part, error in parts.items()}
     return there, {part: float(np.abs(error).max()) for part, error in parts.items()}
+
+
+def _parts(errors: Errors, by: float, read: float = 0.0) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the shares and largest of the parts of coordinates."""
+    parts = {"model": errors.a, "step": by * errors.b} | ({"importer": errors.c} if read else {})
+    return _laid(parts)
 
 
 def _shares(made: MadeUp, errors: Errors, by: float) -> tuple[dict[str, float], dict[str, float]]:
@@ -117,10 +122,7 @@ def _shares(made: MadeUp, errors: Errors, by: float) -> tuple[dict[str, float], 
         part: np.interp(at, knots, np.append(0.0, error))
         for part, error in (("model", errors.late), ("step", by * errors.later))
     }
-    whole = parts["model"] + parts["step"]
-    worst = int(np.argmax(np.abs(whole)))
-    there = {part: float(np.sign(whole[worst]) * error[worst]) for part, error in parts.items()}
-    return there, {part: float(np.abs(error).max()) for part, error in parts.items()}
+    return _laid(parts)
 
 
 def _of_steps(made: MadeUp, errors: Errors) -> Iterator[Found]:

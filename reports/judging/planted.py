@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,6 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.friction import slips
 from crossbody.reports.measuring.truth import taken
-
-if TYPE_CHECKING:
-    pass
 
 PART = 0.02
 """Part of the largest by which a signal is off: no limit on a motion may be as wide."""

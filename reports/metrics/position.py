@@ -10,7 +10,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import differences
 from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.scale import RESTS, ROUNDING, least, of_like, rounded
+from crossbody.reports.measuring.scale import RESTS, ROUNDING, least, of_like
 from crossbody.reports.measuring.truth import Truth
 
 UNIT = "1"
@@ -94,7 +94,7 @@ def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:
         return own
     most = max(float(own.max()), ROUNDING * float(np.max(np.abs(motion.q))))
     if most < ROUNDED * ROUNDING:  # nor do coordinates near zero tell how large the mechanism is
-        most = max(rounded(motion.q), RESTS)
+        most = RESTS
     if system is None or system.jumps:
         return np.full(own.shape, most)
     some = spread(motion)[:: -(-SAMPLES // FEW)]

@@ -68,7 +68,7 @@ def _lead(about: Mapping[str, Any]) -> str:
     if not about:
         return "No motion of this case is stored."
     tier = about.get("tier", "")
-    known = f"Truth {tier[:1]}: {tier[2:]}" if tier in set(Tier) else f"Compared with: {tier}"
+    known = f"Compared with: {tier}" if figures.of_log(about) else f"Truth {tier[:1]}: {tier[2:]}"
     truth = f" {known} ({about['source'].rstrip('.')})." if tier else ""
     title = about["title"].rstrip(".")
     return f"{title[:1].upper()}{title[1:]}.{truth}"
@@ -114,7 +114,7 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
 def _truths(about: Mapping[str, Any]) -> str:
     """What the letters of truths mean: those of a case, or that of a log."""
     tier = about.get("tier", "")
-    return f"{tier[:1]}: {tier}" if tier not in {"", *Tier} else ", ".join(Tier)
+    return f"{tier[:1]}: {tier}" if figures.of_log(about) else ", ".join(Tier)
 
 
 def _far(row: Row) -> tuple[int, float]:
@@ -159,7 +159,7 @@ def _run(trace: Trace) -> dict[str, Any]:
 
 def _audit(found: Results, case: CaseFiles) -> list[Section]:
     """What reached the engines; nothing where a log is what they are compared with."""
-    if case.about.get("tier", "") not in {"", *Tier}:
+    if figures.of_log(case.about):
         return []
     said = {row["who"]: row["verdict"] for row in found.rows.get(case.label, ()) if row["metric"] == "audit"}
     told = [

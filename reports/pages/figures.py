@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import isnan
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,9 +74,9 @@ def floor_of(truth: Floats, part: float = EPS) -> float:
     return float(10.0 ** np.floor(np.log10(largest * part))) if largest > 0.0 else 1e-17
 
 
-def of_log(traces: Sequence[Trace]) -> bool:
-    """Whether the lead is a log, which is no truth: it resolves what its sensors do."""
-    return traces[0].about.get("tier", "") not in {"", *Tier}
+def of_log(about: Mapping[str, Any]) -> bool:
+    """Whether what a motion is held against is a log, which is no truth: it resolves what its sensors do."""
+    return about.get("tier", "") not in {"", *Tier}
 
 
 def apart(mine: Floats, theirs: Floats, floor: float) -> Floats:
@@ -152,11 +153,11 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE,
     names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
     # One floor a unit, by the largest value in any run: a coordinate that stays at 0 has its neighbours' size.
     sizes = _largest((trace.run.q for trace in traces), len(names))
-    part = SENSED if of_log(traces) else EPS
+    part = SENSED if of_log(traces[0].about) else EPS
     floors = {unit: floor_of(sizes[[k for k, (_, u) in enumerate(names) if u == unit]], part) for _, unit in names}
     shown = which or sorted(farthest(traces)[:MOST_SIGNALS])
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
-    title = "Coordinates, and |measured minus predicted|" if of_log(traces) else MATCHED
+    title = "Coordinates, and |measured minus predicted|" if of_log(traces[0].about) else MATCHED
     sheet = Sheet(rows, title, points, group=2)
     for i, trace in enumerate(traces):
         t, q = filled(trace.run, trace.quaternions)
@@ -370,7 +371,7 @@ def _names(traces: Sequence[Trace], noun: str) -> list[str]:
 
 def note(name: str, traces: Sequence[Trace]) -> str:
     """What the reader of a figure must know."""
-    told = [LOG_NOTE if name == "motion" and of_log(traces) else NOTES.get(name, "")]
+    told = [LOG_NOTE if name == "motion" and of_log(traces[0].about) else NOTES.get(name, "")]
     if name in SIGNALS:
         noun, order, _ = SIGNALS[name]
         names, found = _names(traces, noun), order(traces)
