@@ -137,7 +137,7 @@ def _meet_all(s: Any, m: Model, w: Work) -> None:
     if most <= SLIGHT * s.push_scale:
         return
     s.strict = 1
-    if not _reached(s, m, w):
+    if not _found(s, m, w):
         s.strict = 0
         _found(s, m, w)
 

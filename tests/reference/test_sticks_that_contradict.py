@@ -91,3 +91,37 @@ def test_what_sticks_does_not_move(seed: int) -> None:
         if own >= 0 and own != row:
             sticks = found.mode[:, own] == Mode.STICK
             assert np.abs(rates[sticks, row]).max(initial=0.0) <= MOVES * RTOL * max(1.0, np.abs(found.v).max())
+
+
+ARM = """<mujoco><compiler angle="radian"/><default><geom friction="{mu} 0 0" solref=".01 .5" solimp=".9 .9 .001"/>
+  <joint axis="0 1 0" limited="true" solreflimit=".01 .5" solimplimit=".9 .9 .001"/></default><worldbody>
+  <geom name="floor" type="plane" size="5 5 1"/>
+  <body name="upper" pos="0 0 .5"><joint name="a" frictionloss="{dry[0]}" range="-2 .9"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03" contype="0" conaffinity="0" mass="1"/>
+    <body name="lower" pos="0 0 -.3"><joint name="b" frictionloss="{dry[1]}" range="-.8 2"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -.25" size=".03" contype="0" conaffinity="0" mass=".6"/>
+      <geom name="tip" type="sphere" pos="0 0 -.25" size=".04" mass=".2"/></body></body></worldbody>
+  <tendon><fixed name="t" frictionloss="{dry[2]}"><joint joint="a" coef="1"/><joint joint="b" coef="{coef}"/></fixed></tendon>
+  <actuator><motor name="m" joint="a"/><motor name="n" joint="b"/></actuator></mujoco>"""
+"""An arm of two dry hinges and a dry tendon whose tip, where it sticks to the floor, leaves it no freedom."""
+PUSHED, BRIEF = 0.16, 1e-5  # s: each pair of torques, and a stick that only a jump of these may end
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_dry_joints_that_a_contact_moves_turn_round_at_once(seed: int, tmp_path: Path) -> None:
+    """What prescribes a motion takes a dry joint through zero: it has no time to stick."""
+    rng = np.random.default_rng([seed, 43])
+    dry = [float(rng.choice(sizes)) for sizes in ([0.1, 1.0], [0.1, 1.0], [0.0, 0.3])]
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.format(mu=rng.choice([0.3, 0.7]), dry=dry, coef=rng.uniform(-1, 1)))
+    case = cases.from_file(str(path), friction=1)
+    made = system(case.scene, case.law, np.array([0.5, 0.3]))
+    inputs = (PUSHED * np.arange(4), 3.0 * rng.normal(size=(4, 2)))
+    found = simulate(made, np.array([0.5, 0.3]), 3.0 * rng.normal(size=2), 0.5, rtol=1e-10, inputs=inputs)
+    assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
+    sticks: dict[int, float] = {}
+    for event in found.events:
+        if event.after is Mode.STICK:
+            sticks[event.contact] = event.t
+        elif event.before is Mode.STICK and event.t not in inputs[0] and event.t < found.t[-1]:
+            assert event.t - sticks.get(event.contact, -np.inf) > BRIEF, event
