@@ -120,7 +120,8 @@ class Trajectory:
         determined_until: until when the law determines the motion, s; finite where contacts that
             slide share a load as no law says (the message names it `indeterminate`).
         unique_until: until when one motion alone keeps the law, s; finite where more than one set
-            of sticking, sliding and open contacts does (`modes_not_unique`).
+            of sticking, sliding and open contacts does (`modes_not_unique`), or none that was found
+            (`sticks_contradict`).
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 

@@ -54,6 +54,8 @@ _NOTES = {
     ),
     "not_unique": "modes_not_unique: more than one set of sticking and sliding contacts was consistent at an instant; "
     "the one that was reached first was used.",
+    "unmet": "sticks_contradict: contacts that stuck at an instant asked for accelerations that exclude each other, and no "
+    "set of modes was found that all of them meet; they were met in the least squares.",
 }
 _LOOPS_PRESS = (
     "indeterminate: loops hold a contact that may slide, so that its normal force and friction are "
@@ -283,7 +285,7 @@ class CompiledRun:
             if self.nz
             else None,
             determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
-            unique_until=float(state["unique_until"]) if state["not_unique"] else np.inf,
+            unique_until=float(state["unique_until"]) if state["not_unique"] or state["unmet"] else np.inf,
         )  # fmt: skip
         if self.callback is not None:
             controller = self.callback.controller

@@ -167,7 +167,8 @@ STATE = np.dtype(
         ("open_gain", "f8"),  # how fast a share changes any,
         ("open_lever", "f8"),  # and what of a slip that is beside the coordinates' velocities
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent,
-        ("unique_until", "f8"),  # s: and the first of them
+        ("unmet", "i8"),  # instants at which sticks contradicted each other in every set that was found,
+        ("unique_until", "f8"),  # s: and the first of either
         ("not_searched", "i8"),  # instants at which there were too many sets to see whether another was
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("jam", "i8"),  # contacts have just come to where they jam together

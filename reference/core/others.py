@@ -114,6 +114,13 @@ def _has_cones(s: Any, m: Model, w: Work) -> bool:
 
 
 @compiled
+def note_first(s: Any, found: bool) -> None:
+    """Note the first instant from which on more than one motion keeps the law, or none is known to."""
+    if found and s.not_unique + s.unmet == 0:
+        s.unique_until = s.t
+
+
+@compiled
 def count_others(s: Any, m: Model, w: Work) -> None:
     """Note whether another set is consistent as well and leads to another motion, or that there are too many to try.
 
@@ -149,7 +156,6 @@ def count_others(s: Any, m: Model, w: Work) -> None:
         if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
             for j in range(s.na):
                 found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
-    if found and s.not_unique == 0:
-        s.unique_until = s.t
+    note_first(s, found)
     s.not_unique += found
     put_back(s, m, w)

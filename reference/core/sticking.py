@@ -35,7 +35,7 @@ from crossbody.reference.core.mode_set import (
     put_back,
     size_along,
 )
-from crossbody.reference.core.others import count_others
+from crossbody.reference.core.others import count_others, note_first
 from crossbody.reference.core.slips import face, note_speed
 
 BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
@@ -127,7 +127,7 @@ def _meet_all(s: Any, m: Model, w: Work) -> None:
     """Let sticks that contradict each other yield to a set that all rows meet, if there is one.
 
     Two feet of a body that turns cannot both stand. Where they contradict each other slightly, as those of a flat one
-    that rocks, or where no set is met, they are met in the least squares.
+    that rocks, or where no set is met, which is noted, they are met in the least squares.
     """
     most = 0.0
     for j in range(s.na if s.dependent_rows > 0 and s.leeway == 0.0 else 0):
@@ -140,6 +140,8 @@ def _meet_all(s: Any, m: Model, w: Work) -> None:
     if not _found(s, m, w):
         s.strict = 0
         _found(s, m, w)
+        note_first(s, True)
+        s.unmet += 1
 
 
 @compiled
