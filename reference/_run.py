@@ -54,8 +54,8 @@ _NOTES = {
     ),
     "not_unique": "modes_not_unique: more than one set of sticking and sliding contacts was consistent at an instant; "
     "the one that was reached first was used.",
-    "unmet": "sticks_contradict: contacts that stuck at an instant asked for accelerations that exclude each other, and no "
-    "set of modes was found that all of them meet; they were met in the least squares.",
+    "unmet": "sticks_contradict: contacts that stuck at an instant excluded each other, and no set of modes was found "
+    "that all of them meet; they were met in the least squares.",
 }
 _LOOPS_PRESS = (
     "indeterminate: loops hold a contact that may slide, so that its normal force and friction are "

@@ -215,7 +215,7 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
         return None
     reasons = [
         (truth.trajectory.determined_until, "the law does not determine the normal forces of sliding contacts"),
-        (truth.trajectory.unique_until, "not one set alone of sticking, sliding and open contacts is known to satisfy the law"),
+        (truth.trajectory.unique_until, "not one set alone of sticking, sliding and open contacts satisfies the law"),
         (_arbitrary(truth, second, case), "the law does not determine which of several dependent rows opens first"),
     ]
     if truth.parted < case.t_end and grown[-1] > MULTIPLIED:

@@ -101,7 +101,8 @@ ARM = """<mujoco><compiler angle="radian"/><default><geom friction="{mu} 0 0" so
     <body name="lower" pos="0 0 -.3"><joint name="b" frictionloss="{dry[1]}" range="-.8 2"/>
       <geom type="capsule" fromto="0 0 0 0 0 -.25" size=".03" contype="0" conaffinity="0" mass=".6"/>
       <geom name="tip" type="sphere" pos="0 0 -.25" size=".04" mass=".2"/></body></body></worldbody>
-  <tendon><fixed name="t" frictionloss="{dry[2]}"><joint joint="a" coef="1"/><joint joint="b" coef="{coef}"/></fixed></tendon>
+  <tendon><fixed name="t" frictionloss="{dry[2]}">
+    <joint joint="a" coef="1"/><joint joint="b" coef="{coef}"/></fixed></tendon>
   <actuator><motor name="m" joint="a"/><motor name="n" joint="b"/></actuator></mujoco>"""
 """An arm of two dry hinges and a dry tendon whose tip, where it sticks to the floor, leaves it no freedom."""
 PUSHED, BRIEF = 0.16, 1e-5  # s: each pair of torques, and a stick that only a jump of these may end
