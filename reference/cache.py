@@ -22,6 +22,7 @@ import llvmlite
 import llvmlite.binding as llvm
 import numba
 import numba.core.config as numba_config
+import numpy as np
 from numba.core import sigutils, types, typing
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
@@ -30,6 +31,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.runtime import _nrt_python as _nrt
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.np import numpy_support
 
 from crossbody.reference import ahead, code_store
 from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values, name_of, names_within
@@ -158,6 +160,15 @@ class Compiled(Lean):
             yield found
         finally:
             self.py_func.__qualname__ = plain
+
+    def typeof_pyval(self, val: Any) -> Any:
+        """Return the type of an argument: of an array without looking for a mask, which numpy would import first."""
+        if type(val) is not np.ndarray or val.dtype.kind not in "iufcb":
+            return super().typeof_pyval(val)
+        layout, readonly = numpy_support.map_layout(val), not val.flags.writeable
+        kind = types.Array(numpy_support.from_dtype(val.dtype), val.ndim, layout, readonly=readonly)
+        self._types_active_call.add(kind)
+        return kind
 
     def get_compile_result(self, sig: Any) -> CompileResult:
         """Return what was compiled for a signature, compiling it if need be."""

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import eig, null_space
 
 from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
@@ -408,7 +408,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
     weightless = bool(model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
     found: dict[str, Any] = {
         # Compilers fuse bodies without joints, or do not: what moves as one counts as one.
-        "masses": np.bincount(model.body_weldid, model.body_mass)[np.unique(model.body_weldid)[1:]],
+        "masses": np.bincount(model.body_weldid, model.body_mass)[distinct(model.body_weldid)[1:]],
         "gravity": 0.0 if weightless else float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
