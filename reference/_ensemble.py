@@ -212,7 +212,7 @@ def _runs(at, first, last, template, state, model, work, buffers, p, laws, start
 @cache
 def compile_loop() -> Any:
     """Those runs without the interpreter's lock."""
-    word, lines, state = types.int64, types.float64[:, ::1], numba.typeof(np.zeros(1, STATE))
+    word, lines, state = types.int64, types.float64[:, ::1], numba.from_dtype(STATE)[::1]
     laws = types.float64[:, :, :, ::1]
     signature = types.void(
         ADDRESSES, word, word, state, state, TABLE, TABLE, TABLE, lines, laws, lines, types.int8[::1], lines,

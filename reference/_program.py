@@ -22,7 +22,7 @@ from crossbody.reference.core import advance as core
 from crossbody.reference.core.bundles import ADDRESSES, TABLE, function_at
 from crossbody.reference.core.layout import BUFFERS, KERNELS, MODEL, STATE, WORK
 
-_STATE = numba.typeof(np.zeros(1, STATE))
+_STATE = numba.from_dtype(STATE)[::1]
 _ADVANCE = types.int64(ADDRESSES, _STATE, TABLE, TABLE, TABLE, types.int64)
 
 

@@ -163,7 +163,7 @@ class Compiled(Lean):
 
     def typeof_pyval(self, val: Any) -> Any:
         """Return the type of an argument: of an array without looking for a mask, which numpy would import first."""
-        if type(val) is not np.ndarray or val.dtype.kind not in "iufcb":
+        if type(val) is not np.ndarray or val.dtype.kind not in "iufcbV":
             return super().typeof_pyval(val)
         layout, readonly = numpy_support.map_layout(val), not val.flags.writeable
         kind = types.Array(numpy_support.from_dtype(val.dtype), val.ndim, layout, readonly=readonly)

@@ -7,7 +7,6 @@ that runs and judges are made of, plug-ins, versions of libraries, and the proce
 from __future__ import annotations
 
 import hashlib
-import sys
 from collections.abc import Iterator
 
 import numpy as np
@@ -47,7 +46,13 @@ def _name() -> str:
     """Return under which name it is kept that all were right: readable, then a digest of all that they depend on."""
     from crossbody.reference.cache import debugging, machine
 
-    scipy = getattr(sys.modules.get("scipy"), "__version__", "")  # numba has imported it, if it is there
-    depends = (code(), *machine(), np.__version__, scipy, str(debugging()), repr(sorted(installed.digests().items())))
+    depends = (
+        code(),
+        *machine(),
+        np.__version__,
+        installed.version("scipy"),
+        str(debugging()),
+        repr(sorted(installed.digests().items())),
+    )
     digest = hashlib.sha256("\0".join(depends).encode()).hexdigest()[:32]
     return f"known_answers-{digest}"
