@@ -104,6 +104,7 @@ class Compiled(Lean):
     ) -> None:  # fmt: skip
         super().__init__(function, locals, {"nopython": True, **(targetoptions or {})}, pipeline_class=WholePasses)
         self._cache = _Overloads(self)
+        self.kept_as = ""  # the key of what was compiled last
         self.declared = {tuple(signature.args): signature for signature in declared}
 
     def compile(self, sig: Any) -> Any:
@@ -120,7 +121,7 @@ class Compiled(Lean):
             if store is None:
                 with self._counted(), hastened():
                     return super().compile(sig)
-            key = self._cache.key(name, sig)
+            key = self.kept_as = self._cache.key(name, sig)
             if store.has(key):
                 return super().compile(sig)
             if _home(self.py_func).startswith(OURS):
@@ -238,18 +239,7 @@ class _Overloads:
         store = code_store.current() if self.content else None
         if store is None:
             return None
-        key = self.key(self.content, sig)
-        data = store.read(key)
-        if data is None:
-            return None
-        try:
-            whole, *kept = pickle.loads(data)
-            _make_ready(target_context, whole)  # all that code needs of what a compiler sets up
-            return _rebuilt(target_context, *kept)
-        except Exception as error:
-            # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
-            store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
-            return None
+        return restored(store, self.key(self.content, sig), target_context)
 
     def save_overload(self, sig: Any, result: CompileResult) -> None:
         """Keep what was compiled, unless it holds addresses of this process."""
@@ -262,6 +252,21 @@ class _Overloads:
 
     def flush(self) -> None:
         """Forget nothing: what is stale has another key."""
+
+
+def restored(store: code_store.Store, key: str, context: Any) -> CompileResult | None:
+    """Return what was kept under a key, callable; None if nothing was, or if it cannot be used."""
+    data = store.read(key)
+    if data is None:
+        return None
+    try:
+        whole, *kept = pickle.loads(data)
+        _make_ready(context, whole)  # all that code needs of what a compiler sets up
+        return _rebuilt(context, *kept)
+    except Exception as error:
+        # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
+        store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
+        return None
 
 
 _MEMORY = {name if name.startswith("_") else f"NRT_{name}": place for name, place in _nrt.c_helpers.items()}
