@@ -23,10 +23,12 @@ import llvmlite.binding as llvm
 import numba
 import numba.core.config as numba_config
 import numpy as np
+from numba import _dynfunc
 from numba.core import sigutils, types, typing
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import Environment, lookup_environment
+from numba.core.funcdesc import _dynamic_module
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import _nrt_python as _nrt
 from numba.core.runtime import rtsys
@@ -320,7 +322,7 @@ def _rebuilt(
     for begin in reload_init:
         begin()
     library, environment = read_back(context.codegen(), kept, description), _environment(*told)
-    entry = context.get_executable(library, description, environment)
+    entry = _callable(context, library, description, environment)
     environments = tuple(_environment(*one) for one in others)
     for one in environments:
         library.codegen.set_env(one.env_name, one)
@@ -328,6 +330,16 @@ def _rebuilt(
         context.typing_context, context, entry, None, annotation, signature, objectmode, lifted,
         description, library, None, environment, None, reload_init, environments,
     )  # fmt: skip
+
+
+def _callable(context: Any, library: Any, description: Any, environment: Environment) -> Any:
+    """Let Python call a function, as numba does but for its module, which that would import for its name."""
+    place, name = library.get_pointer_to_function(description.llvm_cpython_wrapper_name), description.qualname
+    module = sys.modules.get(description.modname, _dynamic_module)
+    doc = f"compiled wrapper for {name!r}"
+    made = _dynfunc.make_function(module, name.split(".")[-1], doc, place, environment, (library,))
+    library.codegen.set_env(context.get_env_name(description), environment)
+    return made
 
 
 @cache
