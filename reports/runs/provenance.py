@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +51,7 @@ def _versions() -> Mapping[str, str]:
     for name in PACKAGES:
         try:
             found[name] = installed.version(name)
-        except PackageNotFoundError:
+        except ModuleNotFoundError:
             found[name] = "not installed"
     return found
 
