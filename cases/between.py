@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats, distinct
+from crossbody.cases.splines import spline
 from crossbody.cases.trajectory import Trajectory
 
 CROSSINGS = 3
@@ -83,7 +84,5 @@ def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     out = np.stack([np.interp(times, t, column) for column in values.T], axis=1)
     finite = np.isfinite(values).all(axis=0)
     if smooth and len(t) > 2 and finite.any():
-        from scipy.interpolate import CubicSpline  # a tenth of a second, which a case alone does not need
-
-        out[:, finite] = CubicSpline(t, values[:, finite])(np.clip(times, t[0], t[-1]))
+        out[:, finite] = spline(t, values[:, finite], np.clip(times, t[0], t[-1]))
     return out
