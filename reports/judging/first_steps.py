@@ -93,9 +93,8 @@ class Probe:
     def restitution(self) -> float:
         """What pairs must part with; NaN where the engine has none, or rows have their own."""
         law = self.case.law
-        kinds = np.unique(np.stack([law.a0, law.a1, law.b0, law.b1])[:, self.opening], axis=1, return_index=True)[
-            0
-        ].shape[1]
+        laws = np.stack([law.a0, law.a1, law.b0, law.b1])[:, self.opening]
+        kinds = len(set(map(tuple, laws.T.tolist())))
         asked, e = "restitution" in self.asked, float(self.used.get("restitution", np.nan))
         if kinds == 1 and not asked and e > 0.0:
             e = _of_law(*(float(part[self.opening[0]]) for part in (law.a0, law.a1, law.b0, law.b1)))
