@@ -8,6 +8,11 @@ from collections.abc import Iterator
 from functools import cache
 
 
+def readable() -> bool:
+    """Return whether sources stand in files: an archive, or compiled modules alone, say nothing about them."""
+    return __file__.endswith(".py") and os.path.isfile(__file__)
+
+
 @cache
 def digest(folder: str) -> str:
     """Return the digest of names and bytes of all sources below a folder, as they are when it is first asked for."""

@@ -16,7 +16,7 @@ import numpy as np
 from numba.core.compiler import CompileResult
 from numba.core.registry import cpu_target
 
-from crossbody.cases.sources import digest
+from crossbody.cases.sources import digest, readable
 from crossbody.reference import code_store
 from crossbody.reference.cache import debugging, machine, restored
 
@@ -36,7 +36,7 @@ def read(module: str, signature: Any) -> CompileResult | None:
         signature: of the function that it is compiled for.
     """
     known = any(name.startswith(f"{CORE}.") and name not in TABLES for name in sys.modules)
-    store = None if known else code_store.current()
+    store = None if known or not readable() else code_store.current()
     key = None if store is None else store.read(_name(module, signature))
     if store is None or key is None or not store.has(key.decode()):
         return None
@@ -45,8 +45,8 @@ def read(module: str, signature: Any) -> CompileResult | None:
 
 def note(module: str, signature: Any, key: str) -> None:
     """Keep under which key these sources were compiled to."""
-    store, name = code_store.current(), _name(module, signature)
-    if store is not None and key and not store.has(name):
+    store = code_store.current() if key and readable() else None
+    if store is not None and not store.has(name := _name(module, signature)):
         store.write(name, key.encode())
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from crossbody.cases import installed
+from crossbody.cases.sources import readable
 from crossbody.reference import code_store
 from crossbody.reports.sources import code
 
@@ -24,7 +25,7 @@ once = False
 
 def wrong() -> Iterator[Found]:
     """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another."""
-    store = code_store.current() if once else None
+    store = code_store.current() if once and readable() else None
     name = "" if store is None else _name()
     if store is not None and store.has(name) and store.read(name) == RIGHT:
         return
