@@ -36,6 +36,21 @@ def numbers(owner: str, field: str, value: Any, dtype: DTypeLike = np.float64) -
         raise SceneError(f"{owner}.{field} is not an array of {np.dtype(dtype).name}: {error}.") from None
 
 
+def distinct(*values: Any) -> NDArray[Any]:
+    """Return the values of arrays of any shape, each once and in order (n,).
+
+    As `np.unique` does, which imports masked arrays to see whether it was given one: that takes longer than a run.
+    """
+    return np.unique(np.concatenate([np.ravel(one) for one in values]), return_index=True)[0]
+
+
+def quantiles(values: Any, *parts: float) -> Floats:
+    """Return what parts (m,), 0 to 1, of values (n,) lie below, linear between them: as `np.quantile`, and as above."""
+    ordered = np.sort(values, axis=None)
+    found: Floats = np.interp(np.multiply(parts, len(ordered) - 1), np.arange(len(ordered)), ordered)
+    return found
+
+
 def is_number(value: Any) -> bool:
     """Return whether a value stands alone, not in an array; what it is, is not looked at."""
     return np.isscalar(value) or getattr(value, "shape", None) == ()

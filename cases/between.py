@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
+from crossbody.cases.splines import spline
 from crossbody.cases.trajectory import Trajectory
 
 CROSSINGS = 3
@@ -55,7 +56,7 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
         left, right = (np.searchsorted(starts, times, side=side) - 1 for side in ("left", "right"))
         which = np.clip(np.where(again, right, left), 0, None)
         out = np.empty((len(times), columns.shape[1]))
-        for i in np.unique(which):
+        for i in distinct(which):
             a, b = pieces[i]
             stop = min(b + 1, len(run.t)) if b < len(run.t) and run.t[b] > run.t[b - 1] else b
             out[which == i] = _piece(run.t[a:stop], columns[a:stop], times[which == i], smooth)
@@ -72,7 +73,7 @@ def multipliers(run: Trajectory) -> Floats | None:
         return None
     cuts = np.linspace(0.0, 1.0, PARTS, endpoint=False)
     inside = run.t[:-1, None] + np.diff(run.t)[:, None] * cuts
-    return np.concatenate([run.lam, between(run)(np.unique(inside)).lam])
+    return np.concatenate([run.lam, between(run)(distinct(inside)).lam])
 
 
 def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
@@ -83,7 +84,5 @@ def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     out = np.stack([np.interp(times, t, column) for column in values.T], axis=1)
     finite = np.isfinite(values).all(axis=0)
     if smooth and len(t) > 2 and finite.any():
-        from scipy.interpolate import CubicSpline  # a tenth of a second, which a case alone does not need
-
-        out[:, finite] = CubicSpline(t, values[:, finite])(np.clip(times, t[0], t[-1]))
+        out[:, finite] = spline(t, values[:, finite], np.clip(times, t[0], t[-1]))
     return out

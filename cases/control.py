@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arguments import flag, real, shown
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.case import Inputs
 from crossbody.cases.errors import ControlError, InvalidValue
 
@@ -168,7 +168,7 @@ class Controller:
             Inputs(names=names, times=times, values=values[:, : len(names)]),
             Inputs(names=names, times=np.array(self.times), values=own[:, : len(names)]),
         ]
-        every = np.union1d(parts[0].times, parts[1].times)
+        every = distinct(parts[0].times, parts[1].times)
         return Inputs(names=names, times=every, values=parts[0].at(every) + parts[1].at(every))
 
     def _checked(self, t: float, found: Any) -> Floats:

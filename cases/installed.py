@@ -57,23 +57,36 @@ def modules(group: str) -> Mapping[str, str]:
 
 @cache
 def _entry_points(group: str) -> Mapping[str, str]:
-    finders = (one for one in sys.meta_path if one is not PathFinder and hasattr(one, "find_distributions"))
-    if not any(finders) and not any(map(_may_name_plugins, sys.path)):
+    if not _other_finders() and not any(map(_may_name_plugins, sys.path)):
         return {}
     return {point.name: point.module for point in _every_entry_point().select(group=group)}
 
 
-@cache
 def _may_name_plugins(place: str) -> bool:
     """Return whether what is installed there may name a plug-in: the text says it sooner than a parser."""
+    found = _distributions(place)
+    return found is None or any(map(_names_plugins, found.values()))
+
+
+@cache
+def _distributions(place: str) -> Mapping[str, str] | None:
+    """Return the folder of what is told of each distribution that is installed there; None of an archive."""
     try:
         with os.scandir(place or ".") as found:
-            names = [entry.path for entry in found if entry.name.endswith((".dist-info", ".egg-info", ".egg"))]
-    except NotADirectoryError:  # an archive, which has its own reader
-        return True
+            return {
+                _plain(entry.name.partition("-")[0].removesuffix(".egg").removesuffix(".egg-info")): entry.path
+                for entry in found
+                if entry.name.endswith((".dist-info", ".egg-info", ".egg"))
+            }
+    except NotADirectoryError:  # it has its own reader
+        return None
     except OSError:
-        return False
-    return any(map(_names_plugins, names))
+        return {}
+
+
+def _plain(name: str) -> str:
+    """Return a name as all spellings of it are compared."""
+    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def _names_plugins(distribution: str) -> bool:
@@ -92,12 +105,30 @@ def _every_entry_point() -> Any:
 
 
 def version(name: str) -> str:
-    """Return the version of a distribution, which `importlib.metadata.version` does by parsing its whole README."""
-    from importlib.metadata import distribution
+    """Return the version of a distribution.
 
-    found = distribution(name)
-    stated = re.search(r"^Version:\s*(\S+)", found.read_text("METADATA") or "", re.MULTILINE)
-    return stated[1] if stated else found.version
+    `importlib.metadata.version` parses its whole README for that, and imports readers of e-mails and archives.
+
+    Raises:
+        ModuleNotFoundError: if it is not installed.
+    """
+    places = list(map(_distributions, sys.path))
+    told = next((place[_plain(name)] for place in places if place and _plain(name) in place), "")
+    for file in ("METADATA", "PKG-INFO") if told else ():
+        with suppress(OSError), open(os.path.join(told, file), encoding="utf-8", errors="replace") as text:
+            for line in text:
+                if line.startswith("Version:"):
+                    return line.removeprefix("Version:").strip()
+    if not told and None not in places and not _other_finders():
+        raise ModuleNotFoundError(f"{name} is not installed", name=name)
+    from importlib.metadata import version
+
+    return version(name)
+
+
+def _other_finders() -> bool:
+    """Return whether distributions are found elsewhere than in the folders of `sys.path`."""
+    return any(one is not PathFinder and hasattr(one, "find_distributions") for one in sys.meta_path)
 
 
 def use(files: Iterable[str | os.PathLike[str]]) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 
 from crossbody.cases import Case, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.case import Force
 from crossbody.cases.control import Controller
 from crossbody.reference.cache import compiled
@@ -81,9 +81,9 @@ class Acting:
         if control is not None:
             ticks = control.instants(self.case.t_end)
             self.ticks = frozenset(ticks.tolist())
-            self.instants = np.union1d(self.times, ticks).tolist()
+            self.instants = distinct(self.times, ticks).tolist()
         if self.case.force is not None and self.case.force.breaks:
-            self.instants = np.union1d(self.instants, self.case.force.breaks).tolist()
+            self.instants = distinct(self.instants, self.case.force.breaks).tolist()
 
     def reset(self) -> None:
         """Begin a run, with a controller of its own."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import STEEPEST, Contact, contacts
@@ -255,7 +255,7 @@ class Contacts:
 
     def _chosen(self, wanted: Sequence[int]) -> _Choice:
         pairs = [self.all[k] for k in dict.fromkeys(self.rows[row][0] for row in wanted)]
-        shapes = np.unique([self.number[one.name] for pair in pairs for one in (pair.first, pair.second)]).astype(int)
+        shapes = distinct([self.number[one.name] for pair in pairs for one in (pair.first, pair.second)]).astype(int)
         bodies, carrier = np.unique(self._body[shapes], return_inverse=True)
         return _Choice(groups=self._grouped(wanted, shapes), shapes=shapes, bodies=bodies, carrier=carrier)
 

@@ -9,12 +9,11 @@ from time import perf_counter
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import brentq
 
 from crossbody.cases import Case, Event, Mode, Outcome, Parameter, Trajectory
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Bytes, Floats
+from crossbody.cases.brent import brent
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines._line import CONTACT, FREE, Line, why_no_line
 from crossbody.engines.contract import Run
@@ -134,9 +133,11 @@ def _touch(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Cro
 
 def _turn(line: Line, t: Floats, q: Floats, v: Floats, i: int, row: int) -> Crossing | None:
     """From the cubic through both ends of a step: only the rate of the acceleration jumps inside."""
+    from scipy.interpolate import CubicHermiteSpline  # which takes longer to import than most runs
+
     cubic = CubicHermiteSpline(t[i : i + 2], q[i : i + 2], v[i : i + 2])
     rate = cubic.derivative()
-    at = float(brentq(lambda s: float(line.spring(cubic(s), rate(s))[row]), t[i], t[i + 1], xtol=1e-300, rtol=1e-15))
+    at = float(brent(lambda s: float(line.spring(cubic(s), rate(s))[row]), t[i], t[i + 1], xtol=1e-300, rtol=1e-15))
     return (i + 1, at, cubic(at), rate(at), -1) if t[i] < at < t[i + 1] else None
 
 

@@ -6,12 +6,11 @@ import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from typing import Any, TypeVar
 
-from crossbody.cases import CrossbodyError, LogFormatError
+from crossbody.cases import CrossbodyError, LogFormatError, installed
 from crossbody.hw.budget import current
 
 LENGTH = 160  # of a library's own words
@@ -118,4 +117,4 @@ def words(error: BaseException) -> str:
 
 def library(package: str) -> str:
     """Name and version of the package that reads, for provenance."""
-    return f"{package} {version(package)}"
+    return f"{package} {installed.version(package)}"

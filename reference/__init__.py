@@ -12,6 +12,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from crossbody.reference import _numba
+
 if TYPE_CHECKING:
     from crossbody.reference import kernels
     from crossbody.reference._ensemble import Ensemble, ensemble
@@ -29,6 +31,8 @@ _LAZY |= dict.fromkeys(("Violation", "recheck"), "_recheck")
 
 def __getattr__(name: str) -> Any:
     """Import numba only when something of it is asked for."""
+    if name in __all__:
+        _numba.load()
     if name == "kernels":
         return import_module("crossbody.reference.kernels")
     if name in _LAZY:

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from crossbody.cases import Inputs
+from crossbody.cases.arrays import distinct
 from crossbody.reference.kinds import Floats, Index
 
 Row = tuple[float, Floats, Floats]  # an instant, and t0 and a0 (na,) from there on
@@ -100,7 +101,7 @@ class Activations:
         t0, a0 = np.full(len(a), t), np.array(a)
         yield t, t0.copy(), a0.copy()
         left, ends = self.end(a, u)
-        for stop in np.unique(t + left):
+        for stop in distinct(t + left):
             if t < stop < end:
                 there = t + left == stop
                 t0[there], a0[there] = stop, ends[there]

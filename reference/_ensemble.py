@@ -18,7 +18,7 @@ from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
-from crossbody.cases.arrays import frozen, numbers
+from crossbody.cases.arrays import distinct, frozen, numbers
 from crossbody.cases.control import Control
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference import kernels
@@ -105,7 +105,7 @@ def ensemble(
     for _ in range(count):
         spaces.put(_space(system, job, settings))
     loop = bound(compile_loop(), kernels.NAMES, tuple(system.kernels.values()), advance_address())
-    edges = np.unique(np.linspace(0, job.size, count * CHUNKS + 1).astype(int))
+    edges = distinct(np.linspace(0, job.size, count * CHUNKS + 1).astype(int))
     began = time.perf_counter()
     with ThreadPoolExecutor(count) as pool:
         list(pool.map(lambda ends: job.call(loop, spaces, *ends), pairwise(edges)))
@@ -212,7 +212,7 @@ def _runs(at, first, last, template, state, model, work, buffers, p, laws, start
 @cache
 def compile_loop() -> Any:
     """Those runs without the interpreter's lock."""
-    word, lines, state = types.int64, types.float64[:, ::1], numba.typeof(np.zeros(1, STATE))
+    word, lines, state = types.int64, types.float64[:, ::1], numba.from_dtype(STATE)[::1]
     laws = types.float64[:, :, :, ::1]
     signature = types.void(
         ADDRESSES, word, word, state, state, TABLE, TABLE, TABLE, lines, laws, lines, types.int8[::1], lines,

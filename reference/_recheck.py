@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import Mode, Trajectory, arguments
+from crossbody.cases.arrays import distinct
 from crossbody.cases.control import Control
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
@@ -163,7 +164,7 @@ class _Recheck:
     def _smooth(self) -> NDArray[np.bool_]:
         """Intervals from a row to the next inside which nothing switches."""
         t, mode = self.run.t, self.run.mode
-        stops = np.unique([*(e.t for e in self.run.events), *(s.t for s in self.run.switches), *self.inputs_t])
+        stops = distinct([*(e.t for e in self.run.events), *(s.t for s in self.run.switches), *self.inputs_t])
         inside = np.searchsorted(stops, t[1:], "left") - np.searchsorted(stops, t[:-1], "right") > 0
         # A single row at an event shows the state before it.
         behind = np.concatenate([[True], t[1:] == t[:-1]]) | ~np.isin(t, [e.t for e in self.run.events])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import SceneError
 from crossbody.cases.arguments import flag, shown
-from crossbody.cases.arrays import frozen, full, is_number
+from crossbody.cases.arrays import distinct, frozen, full, is_number
 from crossbody.cases.control import Control
 from crossbody.cases.entry_points import checked_arguments, finite, wholes
 from crossbody.reference import kernels as kernel_types
@@ -237,7 +237,7 @@ class System:
         dry, own = loss > 0.0, np.arange(nc)
         slides = np.isfinite(given) & (follows >= 0) & ~dry
         first, count, mu = np.where(dry, own, -1), dry.astype(np.int64), np.where(dry, loss, 0.0)
-        for normal in np.unique(follows[slides]).tolist():
+        for normal in distinct(follows[slides]).tolist():
             rows = np.flatnonzero(slides & (follows == normal))
             if len(rows) > 2 or rows[-1] - rows[0] != len(rows) - 1 or len(set(given[rows].tolist())) > 1:
                 raise SceneError(
@@ -364,7 +364,7 @@ class System:
         entries = self.quaternion_entries.ravel()
         if len(entries) and self.velocity is None:
             raise SceneError("System.quaternions are given without the kernel velocity, which turns them.")
-        if len(entries) and (entries.min() < 0 or entries.max() >= self.nq or len(np.unique(entries)) < len(entries)):
+        if len(entries) and (entries.min() < 0 or entries.max() >= self.nq or len(distinct(entries)) < len(entries)):
             raise SceneError(
                 f"System.quaternions is {np.asarray(self.quaternions).tolist()}; each is the "
                 f"first of four entries of its own, below nq = {self.nq}."

@@ -22,14 +22,18 @@ import llvmlite
 import llvmlite.binding as llvm
 import numba
 import numba.core.config as numba_config
+import numpy as np
+from numba import _dynfunc
 from numba.core import sigutils, types, typing
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import Environment, lookup_environment
+from numba.core.funcdesc import _dynamic_module
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import _nrt_python as _nrt
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
+from numba.np import numpy_support
 
 from crossbody.reference import ahead, code_store
 from crossbody.reference._fingerprint import Unreadable, changed, fingerprint, frozen_values, name_of, names_within
@@ -102,6 +106,7 @@ class Compiled(Lean):
     ) -> None:  # fmt: skip
         super().__init__(function, locals, {"nopython": True, **(targetoptions or {})}, pipeline_class=WholePasses)
         self._cache = _Overloads(self)
+        self.kept_as = ""  # the key of what was compiled last
         self.declared = {tuple(signature.args): signature for signature in declared}
 
     def compile(self, sig: Any) -> Any:
@@ -118,7 +123,7 @@ class Compiled(Lean):
             if store is None:
                 with self._counted(), hastened():
                     return super().compile(sig)
-            key = self._cache.key(name, sig)
+            key = self.kept_as = self._cache.key(name, sig)
             if store.has(key):
                 return super().compile(sig)
             if _home(self.py_func).startswith(OURS):
@@ -158,6 +163,15 @@ class Compiled(Lean):
             yield found
         finally:
             self.py_func.__qualname__ = plain
+
+    def typeof_pyval(self, val: Any) -> Any:
+        """Return the type of an argument: of an array without looking for a mask, which numpy would import first."""
+        if type(val) is not np.ndarray or val.dtype.kind not in "iufcbV":
+            return super().typeof_pyval(val)
+        layout, readonly = numpy_support.map_layout(val), not val.flags.writeable
+        kind = types.Array(numpy_support.from_dtype(val.dtype), val.ndim, layout, readonly=readonly)
+        self._types_active_call.add(kind)
+        return kind
 
     def get_compile_result(self, sig: Any) -> CompileResult:
         """Return what was compiled for a signature, compiling it if need be."""
@@ -227,18 +241,7 @@ class _Overloads:
         store = code_store.current() if self.content else None
         if store is None:
             return None
-        key = self.key(self.content, sig)
-        data = store.read(key)
-        if data is None:
-            return None
-        try:
-            whole, *kept = pickle.loads(data)
-            _make_ready(target_context, whole)  # all that code needs of what a compiler sets up
-            return _rebuilt(target_context, *kept)
-        except Exception as error:
-            # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
-            store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
-            return None
+        return restored(store, self.key(self.content, sig), target_context)
 
     def save_overload(self, sig: Any, result: CompileResult) -> None:
         """Keep what was compiled, unless it holds addresses of this process."""
@@ -251,6 +254,21 @@ class _Overloads:
 
     def flush(self) -> None:
         """Forget nothing: what is stale has another key."""
+
+
+def restored(store: code_store.Store, key: str, context: Any) -> CompileResult | None:
+    """Return what was kept under a key, callable; None if nothing was, or if it cannot be used."""
+    data = store.read(key)
+    if data is None:
+        return None
+    try:
+        whole, *kept = pickle.loads(data)
+        _make_ready(context, whole)  # all that code needs of what a compiler sets up
+        return _rebuilt(context, *kept)
+    except Exception as error:
+        # Whatever a file that is whole lacks here, say a module by which it was imported, compiling brings it.
+        store.drop(key, f"cannot be used here ({type(error).__name__}: {error})")
+        return None
 
 
 _MEMORY = {name if name.startswith("_") else f"NRT_{name}": place for name, place in _nrt.c_helpers.items()}
@@ -304,7 +322,7 @@ def _rebuilt(
     for begin in reload_init:
         begin()
     library, environment = read_back(context.codegen(), kept, description), _environment(*told)
-    entry = context.get_executable(library, description, environment)
+    entry = _callable(context, library, description, environment)
     environments = tuple(_environment(*one) for one in others)
     for one in environments:
         library.codegen.set_env(one.env_name, one)
@@ -312,6 +330,16 @@ def _rebuilt(
         context.typing_context, context, entry, None, annotation, signature, objectmode, lifted,
         description, library, None, environment, None, reload_init, environments,
     )  # fmt: skip
+
+
+def _callable(context: Any, library: Any, description: Any, environment: Environment) -> Any:
+    """Let Python call a function, as numba does but for its module, which that would import for its name."""
+    place, name = library.get_pointer_to_function(description.llvm_cpython_wrapper_name), description.qualname
+    module = sys.modules.get(description.modname, _dynamic_module)
+    doc = f"compiled wrapper for {name!r}"
+    made = _dynfunc.make_function(module, name.split(".")[-1], doc, place, environment, (library,))
+    library.codegen.set_env(context.get_env_name(description), environment)
+    return made
 
 
 @cache

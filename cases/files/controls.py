@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arguments import shown
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.case import Case, Inputs
 from crossbody.cases.control import Control
 from crossbody.cases.errors import InvalidValue, NoFile, UnknownName
@@ -125,7 +125,7 @@ def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Input
         return scene, inputs
     scene = scene.replace(pushes=[Push(name=f"push {i}", body=body) for i, (body, _, _) in enumerate(given)])
     own = [] if inputs is None else inputs.times.tolist()
-    times = np.unique([*own, *(t for _, _, span in given for t in span if np.isfinite(t))])
+    times = distinct([*own, *(t for _, _, span in given for t in span if np.isfinite(t))])
     values = np.zeros((len(times), len(scene.inputs)))
     if inputs is not None:
         values[:, : len(inputs.names)] = inputs.at(times)

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Parameter, Value
@@ -44,6 +43,8 @@ def attitude(s: Floats, spin: Floats, rate: Floats) -> Floats:
     """Return quaternions (n, 4) at times s (n,) from the unit one, with angular velocity spin + rate s in the world."""
     if not np.cross(spin, rate).any():
         return turned(s[:, None] * spin + 0.5 * s[:, None] ** 2 * rate)
+    from scipy.integrate import solve_ivp  # which takes longer to import than most runs
+
     times, back = np.unique(np.append(0.0, s), return_inverse=True)
     found = solve_ivp(
         lambda t, q: 0.5 * product(np.append(0.0, spin + t * rate), q), (0.0, max(times[-1], TINY)),

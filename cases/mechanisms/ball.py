@@ -15,7 +15,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 
-from crossbody.cases.arrays import Bytes, Floats
+from crossbody.cases.arrays import Bytes, Floats, distinct
 from crossbody.cases.between import pieces
 from crossbody.cases.closed_forms import LinearArc
 from crossbody.cases.errors import Outcome
@@ -163,7 +163,7 @@ class Motion:
         t = np.asarray(t, dtype=np.float64)
         piece = pieces(self._starts, t)
         h, v, lam = np.empty_like(t), np.empty_like(t), np.zeros_like(t)
-        for i in np.unique(piece):
+        for i in distinct(piece):
             arc, on = self.arcs[i], piece == i
             h[on], v[on] = arc.states(self.ball, t[on] - arc.t)
             if arc.closed:

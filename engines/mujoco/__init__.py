@@ -191,7 +191,7 @@ def _softness(model: Any) -> dict[str, str]:
     """Return what rows of the obvious model follow, each law once: where it changes, stored runs are of another."""
     kinds = {"solref": "ref", "solimp": "imp"}
     found = {
-        name: np.unique(np.concatenate([getattr(model, of.format(kind)) for of in SOFT]).round(9) + 0.0, axis=0)
+        name: sorted(set(map(tuple, np.concatenate([getattr(model, of.format(kind)) for of in SOFT]).round(9) + 0.0)))
         for name, kind in kinds.items()
     }
     return {name: ",".join("/".join(f"{x:.6g}" for x in row) for row in rows) for name, rows in found.items()}

@@ -8,10 +8,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.optimize import brentq
 
 from crossbody.cases import Mode, Outcome
 from crossbody.cases.arrays import Floats
+from crossbody.cases.brent import brent
 from crossbody.cases.control import NotFinite
 from crossbody.engines._log import Log, Modes
 from crossbody.engines.mujoco._scene import Prepared
@@ -20,7 +20,7 @@ FREE, CONTACT, BALLISTIC = int(Mode.FREE), int(Mode.CONTACT), int(Mode.BALLISTIC
 COLLISION, SEPARATED = int(Mode.COLLISION), int(Mode.COLLISION_SEPARATION)
 TOGETHER = 1e-12
 """Part of a step within which rows cross together: which of them is located first is rounding."""
-TRIALS = 300  # most that one row takes; bisection alone takes 50
+ULPS = 4.0 * float(np.finfo(np.float64).eps)
 Sign = tuple[int, int, float]
 """(row, 0 for its gap or 1 for its multiplier, sign that it has in its present mode)."""
 WATCHED: dict[int, tuple[tuple[int, float], ...]] = {
@@ -41,6 +41,17 @@ SAME_INSTANT = 100  # events in a row without the time moving on that make a cyc
 def signs(modes: Modes, watched: Mapping[int, tuple[tuple[int, float], ...]] = WATCHED) -> list[Sign]:
     """What must keep its sign while the modes last."""
     return [(i, which, sign) for i, mode in enumerate(modes) for which, sign in watched.get(mode, ())]
+
+
+def _root(value: Callable[[float], float], sign: float, full: float) -> float:
+    """Return when a value that has a sign at first has it no more, at the latest behind the full step.
+
+    A trial starts from an evaluation of its own, and may just miss what the step passed.
+    """
+    last = value(full)
+    if sign * last > 0.0:
+        return full
+    return brent(lambda tau: last if tau == full else value(tau), 0.0, full, 1e-15 * full, ULPS)
 
 
 class Locator:
@@ -86,10 +97,7 @@ class Locator:
         for row, which, sign in crossed:
             start = value(0.0, row, which)
             bracketed = sign * start > 0.0
-            try:
-                roots.append(brentq(value, 0.0, full, (row, which), 1e-15 * full, maxiter=TRIALS) if bracketed else 0.0)
-            except ValueError:  # a trial starts from an evaluation of its own, and may just miss what the step passed
-                roots.append(full)
+            roots.append(_root(partial(value, row=row, which=which), sign, full) if bracketed else 0.0)
         tau, nudge = min(roots), 1e-16 * full
         together = {one for one, root in zip(crossed, roots, strict=True) if root <= tau + TOGETHER * full}
         self._redo(tau)

@@ -12,10 +12,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from scipy.linalg import eig, null_space
 
 from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene
@@ -143,6 +142,8 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     as much as all; one that decays by what a unit position or a unit rate makes of it, 1/rate
     where a damper alone holds a light body.
     """
+    from scipy.linalg import eig  # which takes longer to import than a short run
+
     A = _slopes(scene, q, v)
     n = len(A) // 2
     found: Any = eig(A, left=True, right=True)
@@ -176,9 +177,17 @@ def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
     K = np.array([(forces(d, still) - forces(-d, still)) / (2.0 * step) for d in lift]).T
     D = np.array([(forces(still, d) - forces(still, -d)) / (2.0 * step) for d in lift]).T
     root = np.linalg.inv(np.linalg.cholesky(M))
-    free = null_space(H @ root.T, rcond=DEPENDENT) if len(H) else np.eye(n)
+    free = _null_space(H @ root.T) if len(H) else np.eye(n)
     mobility = root.T @ free @ free.T @ root
     return np.block([[np.zeros((n, n)), np.eye(n)], [mobility @ K, mobility @ D]])
+
+
+def _null_space(rows: Floats) -> Floats:
+    """Return an orthonormal basis of what rows map to nothing."""
+    from scipy.linalg import null_space
+
+    found: Floats = null_space(rows, rcond=DEPENDENT)
+    return found
 
 
 def build(
@@ -408,7 +417,7 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
     weightless = bool(model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY))
     found: dict[str, Any] = {
         # Compilers fuse bodies without joints, or do not: what moves as one counts as one.
-        "masses": np.bincount(model.body_weldid, model.body_mass)[np.unique(model.body_weldid)[1:]],
+        "masses": np.bincount(model.body_weldid, model.body_mass)[distinct(model.body_weldid)[1:]],
         "gravity": 0.0 if weightless else float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, quantiles
 from crossbody.cases.scene import RowLaw, Scene
 from crossbody.cases.scene_contacts import by_shapes
 from crossbody.engines._log import Modes
@@ -104,7 +104,7 @@ def obvious(scene: Scene, *, colliding: bool = False) -> Any:
         for kind in ("ref", "imp"):
             getattr(model, name.format(kind))[:] = getattr(plain, f"geom_sol{kind}")[0]
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    if (part := float(np.median(model.dof_M0)) / model.stat.meaninertia) < LOCKED:
+    if (part := float(quantiles(model.dof_M0, 0.5)[0]) / model.stat.meaninertia) < LOCKED:
         model.opt.tolerance *= part
     return model
 

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import UPRIGHT, Loop, Tendon
@@ -219,6 +217,9 @@ class Strings:
     @property
     def chained(self) -> bool:
         """Whether the ends move apart from each other, or as one, and bounds make no ring of them."""
+        from scipy.sparse import coo_array  # which takes longer to import than most runs
+        from scipy.sparse.csgraph import connected_components
+
         kinds, group = np.unique(self.spans.moving, axis=0, return_inverse=True)
         one, two = (group[ends][self.of] for ends in (self.spans.one, self.spans.two))
         joined = connected_components(coo_array((np.ones(len(one)), (one, two)), (len(kinds),) * 2), directed=False)[0]

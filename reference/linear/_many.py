@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from crossbody.cases import InvalidValue
-from crossbody.cases.arrays import frozen
+from crossbody.cases.arrays import distinct, frozen
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats, Index
@@ -129,7 +129,7 @@ def shared(part: Callable[[int, int], None], count: int, threads: int | None) ->
     workers = threads if threads is not None else len(os.sched_getaffinity(0))
     if not workers >= 1:
         raise InvalidValue(f"threads is {threads}; it must be at least 1.")
-    edges = np.unique(np.linspace(0, count, workers * CHUNKS + 1).astype(int)).tolist()
+    edges = distinct(np.linspace(0, count, workers * CHUNKS + 1).astype(int)).tolist()
     if workers == 1 or count < 2 * CHUNKS:
         part(0, count)
         return

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Outcome
+from crossbody.cases.brent import brent
 from crossbody.reference.kinds import Floats, Floats2
 from crossbody.reference.sundials import roots
 from crossbody.reference.sundials.arcs import CHUNK, FAR, ORDER, ORDER_IN_CONTACT, SHARE, Fired, State
-from crossbody.reference.sundials.brent import brent
 from crossbody.reference.sundials.dense import DenseStep
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.friction_alarms import Alarm, values

@@ -117,9 +117,11 @@ class ModeProblem:
         off = [] if i in self.sliding.dry else [(Mode.FREE, nothing)]
         if i in self.slides:
             return [(Mode.SLIP, self.slides[i]), *off]
-        aim = self._aim(i)
-        ways = [aim, -aim]
-        if len(aim) > 1:
+        aim, weight = self._aim(i), np.diag(self.seen.G)[self._along(i)]
+        ways, moves = [aim, -aim], weight > ULP * weight.max(initial=0.0)
+        if len(aim) > 1 and moves.sum() == 1:  # what moves in a plane slips along one line
+            ways = [moves.astype(float), -moves.astype(float)]
+        elif len(aim) > 1:
             ways = [turn.real * aim + turn.imag * aim[::-1] * [-1.0, 1.0] for turn in turns]
         return [(Mode.STICK, nothing), *((Mode.SLIP, way) for way in ways), *off]
 

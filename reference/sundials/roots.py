@@ -18,8 +18,8 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from crossbody.cases.brent import brent
 from crossbody.reference.kinds import Floats
-from crossbody.reference.sundials.brent import brent
 
 SCREENING, COARSE, FINE = 4, 8, 16  # degrees tried: the first only to tell that nothing fires
 HALVINGS = 6

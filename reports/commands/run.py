@@ -17,6 +17,7 @@ from crossbody.reports import voice
 from crossbody.reports.commands import planned
 from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
+from crossbody.reports.judging import known
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.verdict import Row, exit_code
@@ -47,6 +48,7 @@ def run(
     planned.check_settings(cases, picks, asked, rtol)
     for sentence in dict.fromkeys(f"{case.name}: {finding}" for case in cases for finding in findings(case)):
         click.echo(voice.folded(f"note: {sentence}"), err=True)
+    known.once = watch.alone()
     told = provenance(command, rtol=rtol, seed=SEED)
     clock, compiled = [perf_counter()], count.seconds
     decides = identity("run", cases, names, picks=picks, rtol=rtol, settings=asked, budget=budget)

@@ -14,7 +14,7 @@ from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports import layout, voice
 from crossbody.reports.runs import output, study
 from crossbody.reports.runs.manifest import PAGE
-from crossbody.reports.runs.provenance import code
+from crossbody.reports.sources import code
 
 if TYPE_CHECKING:
     import pandas as pd

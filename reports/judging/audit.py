@@ -6,7 +6,7 @@ engine shows them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -145,9 +145,27 @@ def _function(
     return _row(key, mine, f"{STATES} states", f"{STATES} states", worst, hidden)
 
 
+def answered_once(shown: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return what an audit shows with functions that compute an answer once, however often they are asked for it."""
+    return {key: _answered_once(value) if callable(value) else value for key, value in shown.items()}
+
+
+def _answered_once(function: Callable[..., Any]) -> Callable[..., Any]:
+    known: dict[tuple[bytes, ...], Any] = {}
+
+    def ask(*at: Floats) -> Any:
+        key = tuple(array.tobytes() for array in at)
+        if key not in known:
+            known[key] = function(*at)
+        return known[key]
+
+    return ask
+
+
 def audit(
-    mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case, hidden: Mapping[str, str] = MappingProxyType({})
-) -> tuple[AuditRow, ...]:
+    mine: Mapping[str, Any], theirs: Mapping[str, Any], case: Case, hidden: Mapping[str, str] = MappingProxyType({}),
+    at: Sequence[tuple[Floats, Floats]] = (),
+) -> tuple[AuditRow, ...]:  # fmt: skip
     """Compare what `Run.audit()` of an engine shows with the reference's.
 
     Args:
@@ -155,8 +173,9 @@ def audit(
         theirs: of the reference; what it lacks is not asked for.
         case: the scene.
         hidden: quantity -> why the engine does not show it (`crossbody.engines.hidden`).
+        at: positions and velocities at which functions are compared; those of `states` if none are given.
     """
     hidden = {**hidden, **mine.get("hidden", {})}
-    at = states(case, theirs)
+    at = at or states(case, theirs)
     functions = (_function(key, mine, theirs, at, hidden) for key in FUNCTIONS if key in theirs)
     return (*_numbers(mine, theirs, hidden), *functions)

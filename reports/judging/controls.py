@@ -6,7 +6,7 @@ A number that is within says something only if it could have been outside. So ev
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.between import between
 from crossbody.engines.contract import QUANTITIES
 from crossbody.reports import metrics
-from crossbody.reports.judging.audit import audit, rounded, states
+from crossbody.reports.judging.audit import answered_once, audit, rounded, states
 from crossbody.reports.judging.planted import Range, faults
 from crossbody.reports.judging.truth import agreement
 from crossbody.reports.measuring.impulse import told
@@ -100,15 +100,16 @@ def unheard(case: Case) -> Iterator[Blind]:
     if "reference" not in engines.names():
         return
     try:
-        theirs = engines.load("reference").prepare(case, "compiled").audit()
+        theirs = answered_once(engines.load("reference").prepare(case, "compiled").audit())
     except CaseUnsupported:
         return
-    asked = [key for key in QUANTITIES if key in theirs and _something(key, theirs, case)]
+    at = states(case, theirs)
+    asked = [key for key in QUANTITIES if key in theirs and _something(key, theirs, case, at)]
     large, small = (
-        {row.quantity: row for row in audit({key: _times(theirs[key], by) for key in asked}, theirs, case)}
+        {row.quantity: row for row in audit({key: _times(theirs[key], by) for key in asked}, theirs, case, at=at)}
         for by in (1.0 + MORE, 1.0 - MORE)
     )
-    missing = {row.quantity: row for row in audit({}, theirs, case)}
+    missing = {row.quantity: row for row in audit({}, theirs, case, at=at)}
     for key in asked:
         for found, (least, most), fault in (
             (large, (0.5 * MORE, 2.0 * MORE), f"{key} {MORE:g} too large"),
@@ -128,9 +129,9 @@ def _times(value: Any, by: float) -> Any:
     return by * np.asarray(value, dtype=np.float64)
 
 
-def _something(key: str, theirs: Mapping[str, Any], case: Case) -> bool:
+def _something(key: str, theirs: Mapping[str, Any], case: Case, at: Sequence[tuple[Floats, Floats]]) -> bool:
     """Whether a value, or a function at the start, is other than 0 somewhere, and than rounding."""
-    least = rounded(key, theirs, states(case, theirs)) if key == "bias" else 0.0
+    least = rounded(key, theirs, at) if key == "bias" else 0.0
     return _more(key, theirs[key], case, least)
 
 

@@ -93,7 +93,8 @@ class Probe:
     def restitution(self) -> float:
         """What pairs must part with; NaN where the engine has none, or rows have their own."""
         law = self.case.law
-        kinds = np.unique(np.stack([law.a0, law.a1, law.b0, law.b1])[:, self.opening], axis=1).shape[1]
+        laws = np.stack([law.a0, law.a1, law.b0, law.b1])[:, self.opening]
+        kinds = len(set(map(tuple, laws.T.tolist())))
         asked, e = "restitution" in self.asked, float(self.used.get("restitution", np.nan))
         if kinds == 1 and not asked and e > 0.0:
             e = _of_law(*(float(part[self.opening[0]]) for part in (law.a0, law.a1, law.b0, law.b1)))
@@ -316,7 +317,7 @@ class Meeting:
 def _meeting(probe: Probe, pair: Rows, way: int, mu: float) -> Meeting | None:
     """Return a state; None where no motion brings the pair together so, or none that leaves the others alone."""
     gap, step = probe.theirs["gap"](probe.case.q0), OF_BLOWS * probe.dt * probe.meets
-    others = np.setdiff1d(probe.opening, pair)
+    others = probe.opening[~np.isin(probe.opening, pair)]
     kept = np.concatenate([gap[probe.held], np.maximum(gap[others], 0.0) + CLEAR])
     every, apart = np.concatenate([probe.held, others, pair]), gap[pair] - np.min(gap[pair])
     q, away = (probe.placed(every, np.concatenate([kept, apart + high])) for high in (BEFORE * step, CLEAR))

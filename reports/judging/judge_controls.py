@@ -30,7 +30,7 @@ UNLIMITED = ("creep_speed", "lam_error", "lam_impulse")
 
 def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
-    from crossbody.reports.judging import known_answers, known_parts, known_steps, known_tables
+    from crossbody.reports.judging import known
     from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
     from crossbody.reports.judging.planted import PART
 
@@ -53,8 +53,7 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
         )
 
     for name, value, (least, most), fault in (
-        *unseen(case, truth, outside), *unheard(case), *_unruled(case),
-        *known_answers.wrong(), *known_parts.wrong(), *known_steps.wrong(), *known_tables.wrong(),
+        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(),
     ):  # fmt: skip
         if least <= value <= most:
             why = f"A control passes: {fault} is no number outside."

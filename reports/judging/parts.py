@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.rotations import turned
 from crossbody.reports.measuring.alignment import clock, matched
 from crossbody.reports.measuring.truth import Truth
@@ -255,9 +255,9 @@ class Positions:
         t, end = clock(truth, run), min(float(truth.trajectory.t[-1]), truth.trusted, until)
         inside = np.flatnonzero(t <= end)
         error = self._error(run.q[inside], truth.at(t[inside]).q) if len(inside) else np.zeros((0, 0))
-        kept = np.unique(np.linspace(0, max(len(inside) - 1, 0), min(len(inside), SAMPLES)).astype(np.intp))
+        kept = distinct(np.linspace(0, max(len(inside) - 1, 0), min(len(inside), SAMPLES)).astype(np.intp))
         if error.size:  # the worst sample is one of them
-            kept = np.union1d(kept, [np.unravel_index(int(np.argmax(self.sizes(error))), error.shape)[0]])
+            kept = distinct(kept, [np.unravel_index(int(np.argmax(self.sizes(error))), error.shape)[0]])
         self.samples, self.whole, self.end = inside[kept], error[kept], end
         self.t = t[self.samples]
 
@@ -275,7 +275,7 @@ class Positions:
         """Have the truth found at once for all runs that will be laid on it."""
         if self.whole.size:
             clocks = (clock(self.truth, run) for run in runs if len(run.t))
-            self.truth.expect(self._asked(t, np.unique(self._around(t))) for t in clocks)
+            self.truth.expect(self._asked(t, distinct(self._around(t))) for t in clocks)
 
     def _around(self, t: Floats) -> NDArray[np.intp]:
         """Return the samples at t (n,) before and behind those of the judged run (2, m)."""
@@ -296,7 +296,7 @@ class Positions:
         if not len(t) or t[-1] < self.t[-1] - REACHED * self.case.t_end:
             raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
         before, behind = around = self._around(t)
-        needed = np.unique(around)
+        needed = distinct(around)
         exact = self.truth.at(self._asked(t, needed))
         error = self._error(run.q[needed], exact.q)
         a, b = (np.searchsorted(needed, side) for side in (before, behind))

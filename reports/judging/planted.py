@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.friction import slips
 from crossbody.reports.measuring.truth import taken
@@ -590,7 +590,7 @@ def _bounds(case: Case, run: Trajectory) -> tuple[NDArray[np.intp], list[slice],
 def _rubbed(plain: Plain, i: int, k: int) -> Iterator[Control]:
     """Change friction of one place at one sample, among its neighbours."""
     hardest = int(np.argmax(_bounds(plain.case, plain.run)[2].max(axis=1)))
-    some = np.union1d(np.arange(max(i - FEW // 2, 0), min(i + FEW // 2, len(plain.run.t))), hardest)
+    some = distinct(np.arange(max(i - FEW // 2, 0), min(i + FEW // 2, len(plain.run.t))), hardest)
     few, i = taken(plain.run, some), int(np.searchsorted(some, i))
     rows, ways, bound = _bounds(plain.case, few)
     own, said = np.array(few.lam[i, ways[k]]), f"friction of row {rows[k]}"

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.remembered import remembered
 from crossbody.cases.scene_contacts import contacts
 from crossbody.reports.measuring.equations import equations
@@ -41,7 +41,7 @@ class Rubbing:
 
     def of_pairs(self, values: Floats) -> Floats:
         """Return the sums (n, pairs, ...) of values of places (n, m, ...) over those of each pair."""
-        return np.stack([values[:, self.pair == k].sum(axis=1) for k in np.unique(self.pair)], axis=1)
+        return np.stack([values[:, self.pair == k].sum(axis=1) for k in distinct(self.pair)], axis=1)
 
 
 SLOW = 1e-3  # part of the largest slip, and of the largest force, below which a direction is not looked at
@@ -157,7 +157,7 @@ def changes(run: Trajectory, found: Rubbing) -> Iterator[tuple[int, float, bool]
 
     What it did when it touched last counts where it comes off in between. A slide shorter than SHORT is none.
     """
-    for pair in np.unique(found.pair):
+    for pair in distinct(found.pair):
         places = np.flatnonzero(found.pair == pair)
         begun = float(run.t[0]) if len(run.t) else 0.0
         pending: list[tuple[int, float, bool]] = []

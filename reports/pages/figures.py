@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Mode, Tier
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, quantiles
 from crossbody.cases.scene_contacts import WAYS
 from crossbody.reports.figures.section import Figure, Plot
 from crossbody.reports.figures.styles import label
@@ -337,7 +337,7 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
         ends = starts[-1:] + lengths[-1:]  # the last step is drawn to its end too
         sheet.line(trace, i, 0, np.maximum(np.r_[lengths, lengths[-1:]], floor), np.r_[starts, ends], shape="hv")
-        usual += [np.quantile(lengths, (REMAINDERS, 1.0))] if len(lengths) else []
+        usual += [quantiles(lengths, REMAINDERS, 1.0)] if len(lengths) else []
     sheet.logarithmic(0)
     if usual:
         sheet.clip(0, 0.3 * float(np.min(usual)), 3.0 * float(np.max(usual)))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Mode
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
@@ -92,7 +92,7 @@ def _over_depth(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
         return {}
     near = carries | np.insert(carries[:-1], 0, False)  # the first sample that does not carry ends a line
     x, y = (np.where(carries, values, np.nan)[near] for values in (depth, lam))
-    at = np.union1d(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), most), np.flatnonzero(np.isnan(y)))
+    at = distinct(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), most), np.flatnonzero(np.isnan(y)))
     look = style(trace, i)
     return {
         "type": "scatter", "mode": "lines", "x": coded(x[at].astype(np.float32)),
@@ -170,10 +170,10 @@ def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dic
     """A line of one engine through evenly chosen samples and those beside its events."""
     x, y = points
     near = np.searchsorted(trace.run.t, [event.t for event in trace.run.events])[: most // 4]
-    at = np.unique(np.r_[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1])
+    at = distinct(np.r_[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1])
     free = ~np.isfinite(x + y)
     at = np.r_[at, np.flatnonzero(free[1:] & ~free[:-1]) + 1]  # a line ends where a contact opens
-    at, look = np.unique(at[(at >= 0) & (at < len(x))]), style(trace, i)
+    at, look = distinct(at[(at >= 0) & (at < len(x))]), style(trace, i)
     return {
         "type": "scatter", "mode": "lines+markers", "marker": {"size": 4},
         "x": coded(x[at].astype(np.float32)), "y": coded(y[at].astype(np.float32)),

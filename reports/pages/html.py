@@ -210,9 +210,9 @@ def policy(scripts: Sequence[str], single: bool) -> str:
     )
 
 
-def assets() -> dict[str, str | bytes]:
+def assets() -> dict[str, bytes]:
     """The files that all pages of a folder share, by name."""
-    return {SCRIPT: _script(), STYLE: _text("page.css"), PLOTLY: _bytes(PLOTLY)}
+    return {SCRIPT: _script().encode(), STYLE: _bytes("page.css"), PLOTLY: _bytes(PLOTLY)}
 
 
 @cache

@@ -6,11 +6,11 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
 
+from crossbody.cases import installed
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import look
 from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share
@@ -188,7 +188,7 @@ def _version(found: Results) -> str:
     """Says if another version made the results."""
     by = str(found.told.get("versions", {}).get("crossbody", "an unknown version"))
     try:
-        mine = version("crossbody")
-    except PackageNotFoundError:
+        mine = installed.version("crossbody")
+    except ModuleNotFoundError:
         return ""
     return "" if by == mine else f"These results were computed by crossbody {by}, the pages by {mine}."

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from crossbody.cases import InvalidValue
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports import scenes
 from crossbody.reports.figures.styles import style
 from crossbody.reports.measuring.scale import idle
@@ -54,7 +54,7 @@ class Film:
         bearing = carrying([trace], idle(trace.run))
         self.lam[:, bearing] = np.nan_to_num(trace.run.lam[:, bearing])
         self.force = float(np.max(np.abs(self.lam), initial=0.0))
-        some = np.unique(np.linspace(0, len(self.q) - 1, 40).astype(int))
+        some = distinct(np.linspace(0, len(self.q) - 1, 40).astype(int))
         poses = self.scene.poses(self.q[some], self.parameters)
         spans = [np.concatenate([*_points(self.stage, pose)]) for pose in poses]
         self.to = _camera(self.stage, spans)

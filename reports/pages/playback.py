@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import CrossbodyError, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct, quantiles
 from crossbody.reports import scenes
 from crossbody.reports.figures.section import Section
 from crossbody.reports.figures.styles import coded, label, style
@@ -94,8 +94,8 @@ def _pushing(
 
 def events(run: Trajectory) -> list[float]:
     """Instants that the buttons lead to, s: those of the first motion, the truth's where there is one."""
-    found = np.unique([event.t for event in run.events])
-    return [float(found[i]) for i in np.unique(np.linspace(0, len(found) - 1, min(len(found), BLOWS)).astype(int))]
+    found = distinct([event.t for event in run.events])
+    return [float(found[i]) for i in distinct(np.linspace(0, len(found) - 1, min(len(found), BLOWS)).astype(int))]
 
 
 def _track(
@@ -119,7 +119,7 @@ def _blows(
 ) -> dict[str, Any]:
     """Collisions that took no time: their instants, and arrows of N s instead of N."""
     struck = [event for event in run.events if event.impulse]
-    chosen_ = [struck[i] for i in np.unique(np.linspace(0, len(struck) - 1, min(len(struck), BLOWS)).astype(int))]
+    chosen_ = [struck[i] for i in distinct(np.linspace(0, len(struck) - 1, min(len(struck), BLOWS)).astype(int))]
     if not chosen_:
         return {"struck": [], "blows": []}
     at = np.minimum(np.searchsorted(run.t, [event.t for event in chosen_]), len(run.t) - 1)
@@ -134,7 +134,7 @@ def chosen(t: Floats, events: Floats, frames: int) -> NDArray[np.intp]:
     even = np.searchsorted(t, np.linspace(t[0], t[-1], max(2, frames // 2)))
     some = np.linspace(0, len(events) - 1, min(len(events), frames // 8)).astype(np.intp)
     near = np.searchsorted(t, events[some])[:, None] + np.array([-2, 0, 1, 3])
-    return np.unique(np.clip(np.concatenate([even, near.ravel()]), 0, len(t) - 1))
+    return distinct(np.clip(np.concatenate([even, near.ravel()]), 0, len(t) - 1))
 
 
 def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
@@ -154,7 +154,7 @@ def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
 def typical(largest: Iterable[float]) -> float:
     """What is drawn as the longest arrow: the median of the largest of each engine, or 0."""
     found = [x for x in largest if x > 0.0]
-    return float(np.median(found)) if found else 0.0
+    return float(quantiles(found, 0.5)[0]) if found else 0.0
 
 
 def _largest(values: Floats) -> float:

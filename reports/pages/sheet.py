@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Mode, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import called, coded, label, level, number, plain, style
 from crossbody.reports.measuring.truth import TRUTH
@@ -81,7 +81,7 @@ class Sheet:
         if not len(t) or not np.isfinite(y).any():
             return
         most = int(np.clip(SHARE * self.points / AROUND, 3, EVENTS))
-        events = np.unique([e.t for e in trace.run.events])[:most]
+        events = distinct([e.t for e in trace.run.events])[:most]
         at = keep(t, y, events, self.points - AROUND * len(events))
         look = style(trace, i)
         line = {
@@ -217,7 +217,7 @@ def changing(traces: Sequence[Trace]) -> tuple[list[tuple[int, str]], list[tuple
     """Contacts (index, name) whose mode changes or differs among engines, and name and mode of the others."""
     moving, still = [], []
     for k, contact in enumerate(traces[0].about["contacts"]):
-        seen = {int(m) for trace in traces for m in np.unique(trace.run.mode[:, k]) if m >= 0}
+        seen = {int(m) for trace in traces for m in distinct(trace.run.mode[:, k]) if m >= 0}
         if len(seen) > 1:
             moving.append((k, contact))
         else:

@@ -5,7 +5,7 @@ They are made from files alone (tables and motions), never with an engine, and c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,7 +20,6 @@ from crossbody.reports.pages.index_page import index_pages
 from crossbody.reports.pages.results import Results, read
 from crossbody.reports.runs import beside, output
 from crossbody.reports.runs.manifest import INDEX, PAGE
-from crossbody.reports.runs.output import replace_text
 from crossbody.reports.runs.study import read_json
 
 FULL = 2.25  # cases whose plots have their usual room in a single file; those of more share it
@@ -56,11 +55,11 @@ def _make(made: Path, single_file: bool, against: Path | None, others: Sequence[
     try:
         found = read(made, against)
         for name, text in _rendered(found, single_file):
-            _put(made, {name: text})
+            _put(made, name, text.encode(), output.put)
     except OutputError as error:  # the hidden folder is nobody's business
         raise OutputError(str(error).replace(str(made), str(out))) from error
-    if not single_file:
-        _put(made, assets())
+    for name, data in {} if single_file else assets().items():
+        _put(made, name, data, output.put_shared)
 
 
 _BROKEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError, TemplateError)
@@ -92,12 +91,11 @@ def _unreadable(found: Results, error: BaseException) -> str:
     return f"{found.out} cannot be shown: a field of {files} or of a motion is not as expected ({what})."
 
 
-def _put(out: Path, files: Mapping[str, str | bytes]) -> None:
-    for name, text in files.items():
-        try:
-            replace_text(out / name, text)
-        except OSError as error:
-            raise OutputError(f"The page {name} in {out} cannot be written: {error.strerror}.") from None
+def _put(out: Path, name: str, data: bytes, write: Callable[[Path, str, bytes], None]) -> None:
+    try:
+        write(out, name, data)
+    except OSError as error:
+        raise OutputError(f"The page {name} in {out} cannot be written: {error.strerror}.") from None
 
 
 def _studies(found: Results) -> Iterator[Page]:

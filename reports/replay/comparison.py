@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from crossbody.cases import InvalidValue, Limit, UnknownName
+from crossbody.cases.arrays import distinct
 from crossbody.cases.errors import several
 from crossbody.hw import Comparison, Fit, Log, Prediction
 from crossbody.hw.replaying.comparison import Row
@@ -192,7 +193,7 @@ def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[st
 def residuals(found: Comparison, points: int = 2000) -> pd.DataFrame:
     """Measured less predicted (`value`) and measured, at even samples of all windows, ends included."""
     windows = np.repeat(np.arange(len(found.windows)), [len(w.t) for w in found.windows])
-    at = np.unique(np.linspace(0, len(windows) - 1, min(points, len(windows))).astype(int))
+    at = distinct(np.linspace(0, len(windows) - 1, min(points, len(windows))).astype(int))
     rows = [pd.DataFrame(columns=list(RESIDUALS))] if not found.predictions else []
     for prediction in found.predictions:
         who, left = f"{prediction.engine}:{prediction.profile}", found.residual(prediction)

@@ -16,7 +16,7 @@ from crossbody.cases.arguments import instance
 from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
-from crossbody.reports.judging.audit import AuditRow, audit
+from crossbody.reports.judging.audit import AuditRow, answered_once, audit
 from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.comparison import check_names, judges_parts
 from crossbody.reports.judging.covered import covered
@@ -113,7 +113,7 @@ def run_case(
     if math.isfinite(truth.tight):
         case = replace(case, tight=truth.tight)
     known = "reference" in engines.names()
-    reference = engines.load("reference").prepare(case, "compiled").audit() if known else {}
+    reference = answered_once(engines.load("reference").prepare(case, "compiled").audit()) if known else {}
     entries = []
     for pick in (of_case(one, case) for one in wanted):
         label = f"{case.label}: {pick.engine}:{pick.profile}"

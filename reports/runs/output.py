@@ -190,6 +190,22 @@ def gather(made: Path) -> Path:
     return staged.home
 
 
+def put(made: Path, name: str, data: bytes) -> None:
+    """Put a file into a study that is being written."""
+    replace_text(made / name, data)
+
+
+def put_shared(made: Path, name: str, data: bytes) -> None:
+    """Put a file that all studies of a folder share into one that is being written.
+
+    Where it stands there already, byte by byte, it is linked: the disk need not take megabytes of script once more.
+    """
+    with suppress(OSError, OutputError):
+        if files.read_inside(_STAGED[made].home, name) == data:
+            return _link(_STAGED[made].home, name, made / name)
+    put(made, name, data)
+
+
 def _link(home: Path, name: str, to: Path) -> None:
     """The same file under a second name; a copy on disks without links. Whoever writes it replaces it."""
     with files.open_inside(home, name) as file:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from datetime import UTC, datetime
-from functools import cache
-from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -49,32 +46,12 @@ def provenance(command: str, **more: Any) -> dict[str, Any]:
     }
 
 
-@cache
-def code() -> str:
-    """Digest of the sources that decide what comes out: of runs, and of how they are judged."""
-    found, reports = hashlib.sha256(), Path(__file__).parents[1]
-    for folder in ("../cases", "../engines", "../reference", "../hw", "judging", "metrics", "sweep"):
-        for path, name in sorted(_sources(str(reports / folder))):
-            with open(path, "rb", buffering=0) as file:
-                found.update(name.encode() + file.read())
-    return found.hexdigest()[:16]
-
-
-def _sources(folder: str, below: str = "") -> Iterator[tuple[str, str]]:
-    """Yield path and name of every source below a folder: a third of the time that `Path.rglob` takes."""
-    for entry in os.scandir(folder):
-        if entry.is_dir():
-            yield from _sources(entry.path, f"{below}{entry.name}/")
-        elif entry.name.endswith(".py"):
-            yield entry.path, below + entry.name
-
-
 def _versions() -> Mapping[str, str]:
     found = {}
     for name in PACKAGES:
         try:
             found[name] = installed.version(name)
-        except PackageNotFoundError:
+        except ModuleNotFoundError:
             found[name] = "not installed"
     return found
 

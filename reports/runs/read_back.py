@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from crossbody.cases import Case, Ledger, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.measuring.truth import TRUTH
@@ -150,7 +150,7 @@ def _named(about: Mapping[str, Any], entry: Entry | None, case: Case) -> Iterato
 
 def _steps(found: Sequence[Sequence[float]], t: Floats) -> Iterator[str]:
     """Yield whether starts and lengths of steps are none of those between instants (n,)."""
-    ends = np.unique(t)
+    ends = distinct(t)
     starts, lengths = np.array(found[0]), np.array(found[1])
     at = np.searchsorted(ends[:-1], starts)
     there = at.max(initial=-1) < len(ends) - 1

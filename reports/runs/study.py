@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from pyarrow.csv import ConvertOptions, ParseOptions, read_csv
 
 from crossbody.cases import Case, OutputError, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.scene_contacts import contacts, turning
 from crossbody.cases.scene_plain import plain
 from crossbody.reports.judging.comparison import judged, unlike_stored
@@ -235,7 +235,7 @@ def _beside(truth: Truth, run: Trajectory) -> Trajectory | None:
 
 def _steps(t: Floats) -> list[list[float]]:
     """Start and length of the steps between the instants t, s: no more of them than a plot shows."""
-    ends = np.unique(t)
+    ends = distinct(t)
     starts, lengths = ends[:-1], np.diff(ends)
     kept = keep(starts, np.log(lengths), np.zeros(0))
     return [starts[kept].tolist(), lengths[kept].tolist()]

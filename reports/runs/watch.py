@@ -62,6 +62,7 @@ class _Diary:
 
 _diary: _Diary | None = None
 _stopping = False
+_begun_for_it = False
 _lost: dict[str, str] = {}
 
 
@@ -80,6 +81,11 @@ def limited(label: str, seconds: float | None = None) -> None:
 def stopping() -> bool:
     """Whether the user has interrupted this process, also where a library took that for its fault."""
     return _stopping
+
+
+def alone() -> bool:
+    """Whether this process was begun for the command, which none but crossbody's own code has touched."""
+    return _begun_for_it
 
 
 def unlimited() -> None:
@@ -277,7 +283,8 @@ def _children(process: int) -> list[int]:
 
 def _obey(command: Callable[[], int]) -> None:
     """Be the child: run the command, and leave without the parent's last words."""
-    code = 3
+    global _begun_for_it
+    code, _begun_for_it = 3, True
     try:
         die_with_parent()
         sys.stdout, sys.stderr = _unread(sys.stdout), _unread(sys.stderr)

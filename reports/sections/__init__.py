@@ -16,10 +16,10 @@ a folder may hold several studies.
 from __future__ import annotations
 
 import json
-from importlib.metadata import version
 from pathlib import Path
 from typing import cast
 
+from crossbody.cases import installed
 from crossbody.cases.registry import Registry
 from crossbody.reports.figures.section import Section
 from crossbody.reports.sections._own import STUDIES, Study
@@ -53,7 +53,7 @@ def shown(name: str, out: Path) -> tuple[Section, ...]:
     try:
         return study.sections(out)
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
-        wrote, mine = _written_by(out), version("crossbody")
+        wrote, mine = _written_by(out), installed.version("crossbody")
         told = (
             f"These tables cannot be shown ({type(error).__name__}: {error}), although this "
             "version wrote them: they were changed, or this is a fault of crossbody. Run the "

@@ -10,7 +10,7 @@ import numpy as np
 
 from crossbody import engines
 from crossbody.cases import Case, CrossbodyError, Event, Mode, Tier, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import matched
@@ -61,7 +61,7 @@ class Error:
 def instants(t_end: float) -> Floats:
     """When a run is looked at, s: what decays at once counts too, for the scale of what rests later."""
     even, early = SHARES
-    return np.unique(np.concatenate([np.linspace(0.0, t_end, even), t_end * np.logspace(-12.0, 0.0, early)]))
+    return distinct(np.concatenate([np.linspace(0.0, t_end, even), t_end * np.logspace(-12.0, 0.0, early)]))
 
 
 def error(case: Case, run: Trajectory, asked: Asked) -> Error:
@@ -114,7 +114,7 @@ def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Tru
         return reason
     rtol = max(SECOND_RTOL, case.tight)
     other = engine.prepare(
-        case, "cvode", rtol=rtol, samples=np.unique(times), max_steps=max_steps, time_limit=time_limit, ledger=False
+        case, "cvode", rtol=rtol, samples=distinct(times), max_steps=max_steps, time_limit=time_limit, ledger=False
     ).run()
     if not other.outcome.ok:
         return f"no truth: the independent integrator ended with {other.outcome.value}"

@@ -16,7 +16,7 @@ from pyarrow import ArrowException
 
 from crossbody.cases import OutputError, installed
 from crossbody.reports.runs import files, manifest, output
-from crossbody.reports.runs.provenance import code
+from crossbody.reports.sources import code
 from crossbody.reports.sweep.execute import COLUMNS, TIMES
 from crossbody.reports.sweep.spec import Spec
 

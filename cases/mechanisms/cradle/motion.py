@@ -10,8 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import nnls
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import pieces
@@ -86,6 +84,9 @@ def pushes(G: Floats, b: Floats) -> Floats:
     x: Floats = np.asarray(np.linalg.solve(G, -b), dtype=np.float64)
     if x.min() >= 0.0:
         return x
+    from scipy.linalg import cholesky, solve_triangular  # which take longer to import than most runs
+    from scipy.optimize import nnls
+
     R = cholesky(G)
     active = nnls(R, solve_triangular(R, -b, trans="T"))[0] > 0.0
     x[:] = 0.0

@@ -11,7 +11,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from scipy.integrate import DOP853
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.mechanisms.cradle.motion import Motion, delassus, pushes
@@ -92,6 +91,8 @@ def _flight(h: Floats, rate: Floats) -> float:
 
 def _pressed(slope: Callable[[float, Floats], Floats], y: Floats, gap: float) -> tuple[Floats, int]:
     """From a touch until all gaps are open again; the state there and the number of steps."""
+    from scipy.integrate import DOP853  # which takes longer to import than most runs
+
     n = len(y) // 2
     solver = DOP853(slope, 0.0, y, math.inf, rtol=RTOL, atol=ATOL, max_step=0.1)
     for steps in range(1, MAX_STEPS + 1):

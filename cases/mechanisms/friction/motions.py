@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.between import pieces
 from crossbody.cases.trajectory import Event, Mode, Trajectory
 
@@ -81,7 +81,7 @@ class Motion:
         """Return the motion at times (n,), s; an event's instant that stands twice is before and after it."""
         t = np.asarray(t, dtype=np.float64)
         piece = pieces(self.starts, t)
-        parts = [self.stages[k].at(t[piece == k] - self.starts[k]) for k in np.unique(piece)]
+        parts = [self.stages[k].at(t[piece == k] - self.starts[k]) for k in distinct(piece)]
         q, v, gap, lam = (np.concatenate(columns) for columns in zip(*parts, strict=True))
         mode = np.array([self.stages[k].modes for k in piece], dtype=np.int8)
         return Trajectory(t=t, q=q, v=v, gap=gap, lam=lam, energy=self.energy(q, v), mode=mode, events=self.events,

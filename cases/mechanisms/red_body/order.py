@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from crossbody.cases import closed_forms as cf
+from crossbody.cases.brent import brent
 from crossbody.cases.closed_forms import LinearArc
 from crossbody.cases.trajectory import Event, Mode
 
@@ -83,7 +82,7 @@ class Fall:
         late = (p["speed_y"] + math.sqrt(max(p["speed_y"] ** 2 + 2.0 * p["gravity"] * high, 0.0))) / p["gravity"]
         if not self.gap(late) < 0.0:  # it has rolled over in the air
             return math.inf
-        return brentq(self.gap, 0.0, late, xtol=1e-300, rtol=1e-15)
+        return brent(self.gap, 0.0, late, xtol=1e-300, rtol=1e-15)
 
     @cached_property
     def tilt(self) -> float:
@@ -124,6 +123,8 @@ class Fall:
     @cached_property
     def rotation(self) -> float:
         """Time from the first touch until the box is level, s."""
+        from scipy.integrate import quad  # which takes longer to import than most runs
+
         # With th = tilt - s^2, dt/ds is smooth even where the turning starts from rest.
         return quad(
             lambda s: -2.0 * s / self.turning(self.tilt - s * s), 0.0, math.sqrt(self.tilt), epsabs=0.0, epsrel=1e-12

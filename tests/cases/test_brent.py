@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from crossbody.reference.sundials.brent import brent
+from crossbody.cases.brent import brent
 
 KINDS = {
     "polynomial": lambda c, x: c[0] + x * (c[1] + x * (c[2] + x * c[3])),
