@@ -264,8 +264,20 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], 
         count = int(np.searchsorted(t, run.t[-1], side="right")) if len(run.t) else 0
         apart = np.zeros(len(t))
         apart[:count] = np.max(differences(run.q[:count], exact[:count], case.quaternions), axis=1)
-        most = np.maximum(most, np.maximum.accumulate(apart) / (off * case.t_end))
+        most = np.maximum(most, grown(t, apart, off))
     return t, most
+
+
+def grown(t: Floats, apart: Floats, off: float) -> Floats:
+    """Return by how much more than in free flight an error of the start has grown until instants (n,).
+
+    Args:
+        t (n,): instants from the start to the horizon, s.
+        apart (n,): how far two motions are apart, m or rad.
+        off: by what their velocities differ at the start, m/s or rad/s.
+    """
+    largest: Floats = np.maximum.accumulate(apart) / (off * t[-1])
+    return largest
 
 
 def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
@@ -342,4 +354,18 @@ def agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
     if len(second.t) and truth.trusted < second.t[-1]:
         second = before(second, truth.trusted)
     found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
+    if truth.tier is Tier.C and not case.general:  # of a scene, rows that share a load may switch in any order
+        found["modes"] = _other_modes(truth, second, case)
     return {name: value for name, value in found.items() if value is not None}
+
+
+def _other_modes(truth: Truth, second: Trajectory, case: Case) -> float:
+    """Return how many modes of samples differ, away from the events of both, of rows that both know."""
+    from crossbody.reports.measuring.alignment import aligned
+
+    inside, exact = aligned(truth, second)
+    t, known = second.t[inside], (exact.mode >= 0) & (second.mode[inside] >= 0)
+    events = np.array([event.t for event in (*truth.trajectory.events, *second.events)])
+    near = np.searchsorted(np.sort(events), t + np.array([[PARTED], [-PARTED]]) * case.t_end)
+    other = known & (exact.mode != second.mode[inside])
+    return float(np.sum(other[near[0] == near[1]]))
