@@ -26,7 +26,8 @@ def wrong() -> tuple[Found, ...]:
     """Return metric, number, least and most, and motion, of what is another number than it must be."""
     return tuple(
         (name, found, (wanted, wanted), said)
-        for name, found, wanted, said in (*_sides(), *_impulses()) if not abs(found - wanted) <= SAME * max(wanted, SAME)
+        for name, found, wanted, said in (*_sides(), *_impulses())
+        if not abs(found - wanted) <= SAME * max(wanted, SAME)
     )  # fmt: skip
 
 
@@ -54,7 +55,9 @@ def _sides() -> Iterator[tuple[str, float, float, str]]:
     at = (0.3, 0.5, 0.8)
     t = np.array([0.0, 0.1, *np.repeat(at, 2), 0.9, END])
     of = np.array([0, 0, 0, 1, 1, 2, 2, 3, 3, 3])
-    events = tuple(Event(t=x, contact=0, before=Mode(a), after=Mode(b)) for x, a, b in zip(at, modes, modes[1:]))
+    events = tuple(
+        Event(t=x, contact=0, before=Mode(a), after=Mode(b)) for x, a, b in zip(at, modes[:-1], modes[1:], strict=True)
+    )
     gaps = {"touches": (0, 2), "comes up to it": (2, 6)}
     for said, (_, k) in (("nothing", (0, 0)), *gaps.items(), ("lets go", (1, 4))):
         gap = np.array([1.0, 0.5, 0.0, 0.0, -DEEP, -DEEP, 0.0, 0.0, 0.5, 1.0])

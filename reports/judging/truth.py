@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, CaseUnsupported, Chaos, EngineUnavailable, Outcome, Tier, Trajectory, arguments
 from crossbody.cases.arrays import Floats
+from crossbody.cases.contacts import CLOSED
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reference import ahead
@@ -360,12 +361,17 @@ def agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
 
 
 def _other_modes(truth: Truth, second: Trajectory, case: Case) -> float:
-    """Return how many modes of samples differ, away from the events of both, of rows that both know."""
+    """Return how many modes of samples differ, away from the events of both, of rows that both know.
+
+    Whether what pushes nothing is just below its surface, or free just above it, rounding decides.
+    """
     from crossbody.reports.measuring.alignment import aligned
 
     inside, exact = aligned(truth, second)
-    t, known = second.t[inside], (exact.mode >= 0) & (second.mode[inside] >= 0)
+    t, mode = second.t[inside], second.mode[inside]
+    flat = np.abs(exact.gap) <= PARTED * float(np.max(np.abs(exact.gap), initial=0.0))
+    told = ~flat | np.isin(exact.mode, CLOSED) | np.isin(mode, CLOSED)
     events = np.array([event.t for event in (*truth.trajectory.events, *second.events)])
     near = np.searchsorted(np.sort(events), t + np.array([[PARTED], [-PARTED]]) * case.t_end)
-    other = known & (exact.mode != second.mode[inside])
+    other = (exact.mode >= 0) & (mode >= 0) & (exact.mode != mode) & told
     return float(np.sum(other[near[0] == near[1]]))

@@ -21,9 +21,9 @@ from crossbody.reports.judging import (
     known_steps,
     known_tables,
     parts,
+    truth,
 )
 from crossbody.reports.judging.clocks import Clock, mistimed
-from crossbody.reports.judging import truth
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.metrics import event_gap
