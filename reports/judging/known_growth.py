@@ -7,10 +7,13 @@ from functools import cache
 
 import numpy as np
 
+from crossbody.cases.defaults import shortest
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.truth import grown
 
 SAME = 1e-9
+SHORT, BRIEF = 1e-6, 0.1
+"""By how much instants may be off, s, and the horizon below which it is as much of that less, s."""
 HORIZONS, RATES, OFF = (1e-3, 0.7, 90.0), (0.3, 2.0, 9.0), 3e-5
 """Horizons, s, growth rates over them, and by what a start is off."""
 Found = tuple[str, float, Range, str]
@@ -27,6 +30,7 @@ def wrong() -> tuple[Found, ...]:
 
 def _asked() -> Iterator[tuple[float, float, str]]:
     for end in HORIZONS:
+        yield shortest(end), SHORT * min(1.0, end / BRIEF), f"what instants of {end:g} s may be off by"
         t = np.linspace(0.0, end, 50)
         yield float(grown(t, OFF * t, OFF)[-1]), 1.0, f"free flight for {end:g} s"
         yield float(grown(t, OFF * t * (end - t), OFF)[-1]), float(np.max(t * (end - t))) / end, "what comes back"

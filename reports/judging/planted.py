@@ -152,6 +152,11 @@ def positions(plain: Plain) -> Iterator[Control]:
                 run=plain.off("q", (i, j), sign * size),
                 sees={"position": ((1.0 - SLACK) * PART, (1.0 + SLACK) * most)},
             )  # fmt: skip
+        yield Control(
+            fault=f"{case.coordinates[j].name} off by {size:.3g} {case.coordinates[j].unit} at the end",
+            run=plain.off("q", (len(run.t) - 1, j), size),
+            sees={"position": ((1.0 - SLACK) * PART, (1.0 + SLACK) * most)},
+        )  # fmt: skip
     for j in case.quaternions[:DRAWN]:
         for i in plain.samples()[:1]:
             turned = _with(run, "q", (i, slice(j, j + 4)), _turned(run.q[i, j : j + 4], plain.draw.normal(size=3)))
