@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -394,3 +394,12 @@ def under_law(scene: Scene, law: Law) -> Scene:
     pairs = [put(pair, places.get(pair.name, 0)) for pair in scene.pairs]
     n = len(scene.joints)
     return scene.replace(loops=loops, joints=bounded[:n], tendons=bounded[n:], pairs=pairs)
+
+
+def softness(scene: Scene, pairs: Sequence[Pair]) -> dict[str, list[float]]:
+    """Return a0 and a1 of all bounds, loops and pairs by name; of a pair by those of its shapes."""
+    parts: tuple[Joint | Tendon, ...] = (*scene.joints, *scene.tendons)
+    bounded = [part for part in parts if not set(part.range) <= set(UNBOUNDED)]
+    laws = {part.name: part.law for part in bounded} | {loop.name: loop.law for loop in scene.loops}
+    laws |= {":".join(sorted((pair.first, pair.second))): pair.law for pair in pairs}
+    return {name: [law.a0, law.a1] for name, law in laws.items()}

@@ -15,7 +15,7 @@ from crossbody.cases import closed_forms as cf
 from crossbody.cases.case import Case, Claim, Coordinate, Parameter, Tier, Value
 from crossbody.cases.mechanisms.cradle.claims import METRICS, SLIDING, limits
 from crossbody.cases.mechanisms.cradle.motion import Motion
-from crossbody.cases.mechanisms.cradle.scene import FROZEN, Row, law, row, scene
+from crossbody.cases.mechanisms.cradle.scene import FROZEN, Row, law, row, scene, turning
 from crossbody.cases.parameters import NumberOrWord, Numbers
 from crossbody.cases.scene_contacts import law_of
 
@@ -118,6 +118,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         closed_form=motion if sliders and rule in FROZEN else None,
         claims=claims,
         metrics={**METRICS, **(SLIDING if sliders else {})},
-        limits=limits(mechanism, rule, balls.gap, claims),
+        limits=limits(mechanism, rule, balls.gap, claims, 0.0 if sliders else turning(parameters)),
         units={k: parameter.unit for k, parameter in PARAMETERS.items()},
     )

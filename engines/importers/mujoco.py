@@ -15,6 +15,43 @@ FAR = 1e12  # margin of a bound with which its row is there wherever it is, m or
 FUSED = "MuJoCo's compiler merges links of a URDF that no joint moves with their parents (fusestatic)."
 
 
+def all_rows(lib: Any, model: Any) -> Any:
+    """Return a model and its data in which all bounds and contacts have rows: wide bounds, balls at one place."""
+    m = copy(model)
+    d = lib.MjData(m)
+    for margin in (m.jnt_margin, m.tendon_margin):
+        margin[:] = FAR
+    m.geom_type[:], m.geom_rbound[:], m.geom_size[:] = int(lib.mjtGeom.mjGEOM_SPHERE), 1.0, 1.0
+    m.opt.disableflags |= int(lib.mjtDisableBit.mjDSBL_MIDPHASE)
+    m.opt.cone = int(lib.mjtCone.mjCONE_ELLIPTIC)
+    for step in (lib.mj_kinematics, lib.mj_comPos, lib.mj_tendon):
+        step(m, d)
+    d.geom_xpos[:] = 0.0
+    for step in (lib.mj_collision, lib.mj_makeConstraint):
+        step(m, d)
+    return m, d
+
+
+def softness(lib: Any, m: Any, d: Any) -> dict[str, list[float]]:
+    """Return of each row of `all_rows`, by its name, what MuJoCo makes of solref and the largest impedance: K dmax, B.
+
+    Those of a contact are named by its shapes.
+    """
+    kind, geoms = lib.mjtConstraint, [m.geom(i).name or f"shape{i}" for i in range(m.ngeom)]
+    of = {
+        int(kind.mjCNSTR_EQUALITY): lambda k: (m.equality(k).name or f"loop{k}", m.eq_solimp[k]),
+        int(kind.mjCNSTR_LIMIT_JOINT): lambda k: (m.joint(k).name or f"joint{k}", m.jnt_solimp[k]),
+        int(kind.mjCNSTR_LIMIT_TENDON): lambda k: (m.tendon(k).name or f"tendon{k}", m.tendon_solimp_lim[k]),
+    }
+    rows = [(*of[int(d.efc_type[j])](int(d.efc_id[j])), j) for j in range(d.nefc) if int(d.efc_type[j]) in of]
+    rows += [(":".join(sorted(geoms[k] for k in one.geom)), one.solimp, one.efc_address)
+             for one in d.contact if one.efc_address >= 0]  # fmt: skip
+    return {
+        name: [float(d.efc_KBIP[j][0] * np.clip(solimp[1], 1e-4, 0.9999)), float(d.efc_KBIP[j][1])]
+        for name, solimp, j in rows
+    }
+
+
 class _Robot:
     free = ball = "mujoco"
 
@@ -170,20 +207,7 @@ class _Robot:
 
     @cached_property
     def _rows(self) -> Any:
-        """Model and data in which all bounds and contacts have rows: wide bounds, balls at one place."""
-        lib, m = self._lib, copy(self._m)
-        d = lib.MjData(m)
-        for margin in (m.jnt_margin, m.tendon_margin):
-            margin[:] = FAR
-        m.geom_type[:], m.geom_rbound[:], m.geom_size[:] = int(lib.mjtGeom.mjGEOM_SPHERE), 1.0, 1.0
-        m.opt.disableflags |= int(lib.mjtDisableBit.mjDSBL_MIDPHASE)
-        m.opt.cone = int(lib.mjtCone.mjCONE_ELLIPTIC)
-        for step in (lib.mj_kinematics, lib.mj_comPos, lib.mj_tendon):
-            step(m, d)
-        d.geom_xpos[:] = 0.0
-        for step in (lib.mj_collision, lib.mj_makeConstraint):
-            step(m, d)
-        return m, d
+        return all_rows(self._lib, self._m)
 
     def surfaces(self) -> Any:
         """MuJoCo's friction in force and margin of each pair; of one without a contact nothing is known."""
@@ -196,27 +220,7 @@ class _Robot:
 
     def softness(self) -> Any:
         """Of each row what MuJoCo makes of solref and of the largest impedance: K dmax and B."""
-        m, d = self._rows
-        kind, geoms, told = self._lib.mjtConstraint, [m.geom(i).name or f"shape{i}" for i in range(m.ngeom)], {}
-        loops = [m.equality(i).name or f"loop{i}" for i in range(m.neq)]
-        names = [joint[0] for joint in self.joints]
-        of = {
-            int(kind.mjCNSTR_EQUALITY): lambda k: (loops[k], m.eq_solimp[k]),
-            int(kind.mjCNSTR_LIMIT_JOINT): lambda k: (names[k], m.jnt_solimp[k]),
-            int(kind.mjCNSTR_LIMIT_TENDON): lambda k: (self._tendons[k], m.tendon_solimp_lim[k]),
-        }
-        for row in range(d.nefc):
-            if (type_ := int(d.efc_type[row])) in of:
-                name, solimp = of[type_](int(d.efc_id[row]))
-                told[name] = self._softness(d.efc_KBIP[row], solimp)
-        for one in d.contact:
-            if one.efc_address >= 0:
-                name = ":".join(sorted(geoms[k] for k in one.geom))
-                told[name] = self._softness(d.efc_KBIP[one.efc_address], one.solimp)
-        return told
-
-    def _softness(self, KBIP: Any, solimp: Any) -> list[float]:
-        return [float(KBIP[0] * np.clip(solimp[1], 1e-4, 0.9999)), float(KBIP[1])]
+        return softness(self._lib, *self._rows)
 
     def place(self, q: Any, v: Any) -> None:
         self._d.qpos[:], self._d.qvel[:] = q, v

@@ -25,6 +25,7 @@ from crossbody.engines._gates import ALL_AT_ONCE
 from crossbody.engines._real_time import depths, resolving_step
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scene import Forces
+from crossbody.engines.importers.mujoco import all_rows, softness
 from crossbody.engines.mujoco._build import compiled, spec_of, without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._gated import GatedRows
@@ -421,6 +422,8 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
         "gravity": 0.0 if weightless else float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
+    if profile == "as_is":
+        found["law"] = softness(mujoco, *all_rows(mujoco, model))
     if profile == "matched" or not case.general:
         found["constants"] = rows.constants(own=profile == "default")
     hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT if case.gates is None else ALL_AT_ONCE}

@@ -15,7 +15,8 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import matrices
-from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Pair, Scene, Shape, Tendon
+from crossbody.cases.scene import UNBOUNDED, UPRIGHT, WIDTHS, Body, Joint, Scene, Shape, Tendon
+from crossbody.cases.scene_contacts import softness
 from crossbody.engines.importers.beside.solids import boxes, composite, posed
 from crossbody.reports.scenes.scene import body_poses
 
@@ -89,7 +90,7 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
             [*(mu if k < pair.dimension - 1 else 0.0 for k, mu in enumerate(pair.friction)), pair.margin]
             for pair in pairs
         ],
-        "softness": _softness(scene, pairs),
+        "softness": softness(scene, pairs),
         "inertias": _inertias(scene, frames[0]),
         "keys": {name: [np.concatenate(q).tolist()] * 2 for name, q in job["keys"].items()},
         "states": of_states,
@@ -99,15 +100,6 @@ def expected(scene: Scene, job: dict[str, Any], touching: Sequence[str] | None =
 def _standing(frame: Any, position: Sequence[float], orientation: Sequence[float]) -> tuple[Floats, Floats]:
     p, R = map(np.array, frame)
     return p + R @ np.array(position), R @ matrices(np.array(orientation))
-
-
-def _softness(scene: Scene, pairs: Sequence[Pair]) -> dict[str, list[float]]:
-    """Return a0 and a1 of all rows."""
-    parts: tuple[Joint | Tendon, ...] = (*scene.joints, *scene.tendons)
-    bounded = [part for part in parts if not set(part.range) <= set(UNBOUNDED)]
-    laws = {part.name: part.law for part in bounded} | {loop.name: loop.law for loop in scene.loops}
-    laws |= {":".join(sorted((pair.first, pair.second))): pair.law for pair in pairs}
-    return {name: [law.a0, law.a1] for name, law in laws.items()}
 
 
 WORLD = [[0.0] * 3, np.eye(3).tolist()]

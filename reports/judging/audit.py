@@ -16,6 +16,7 @@ import numpy as np
 from crossbody.cases import Case
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import normalised
+from crossbody.cases.scene_contacts import softness
 
 TOLERANCE = 1e-10
 LAM_TOLERANCE = 1e-8
@@ -177,5 +178,18 @@ def audit(
     """
     hidden = {**hidden, **mine.get("hidden", {})}
     at = at or states(case, theirs)
+    numbers = (*_numbers(mine, theirs, hidden), *_laws(mine, case))
     functions = (_function(key, mine, theirs, at, hidden) for key in FUNCTIONS if key in theirs)
-    return (*_numbers(mine, theirs, hidden), *functions)
+    return (*numbers, *functions)
+
+
+def _laws(mine: Mapping[str, Any], case: Case) -> Iterator[AuditRow]:
+    """Yield how far a0 or a1 of rows are off, each by its own, of those that an engine has that read the file."""
+    if case.scene is None or "law" not in mine:
+        return
+    wanted = softness(case.scene, case.scene.pairs)
+    off = [
+        difference(mine["law"][name][k], law[k]) for name, law in wanted.items() if name in mine["law"] for k in (0, 1)
+    ]
+    said = f"a0 and a1 of {len(off) // 2} rows"
+    yield AuditRow(quantity="law", mine=said, theirs=said, difference=max(off, default=0.0), tolerance=TOLERANCE)

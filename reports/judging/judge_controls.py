@@ -49,7 +49,7 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
             all(row.verdict == Word.OUTSIDE for row in rows)
             or _lets_pass(case, name, value)
             or _grown(near, name, value)
-            or (name == "rate_residual" and near.blurred)
+            or name in near.untold
         )
 
     for name, value, (least, most), fault in (
@@ -98,6 +98,9 @@ def _unsaid_of_sources(judge_: Judge) -> Iterator[tuple[str, str]]:
         apart = {"position": 0.0, name: 2.0 * truth.allowed * unit}
         if any(row.verdict != Word.OUTSIDE for row in truth_row(judge_.case, replace(truth, agreement=apart), "")):
             yield "truth", f"sources whose {name} differ twice as much as they may are said to agree"
+    other = replace(truth, agreement={"position": 0.0, "modes": 1.0})
+    if any(row.verdict != Word.OUTSIDE for row in truth_row(judge_.case, other, "")):
+        yield "truth", "sources of which one has a row in another mode are said to agree"
 
 
 def _unsaid_of_audits(judge_: Judge) -> Iterator[tuple[str, str]]:
@@ -147,7 +150,7 @@ def _unsaid_of_limits(judge_: Judge) -> Iterator[tuple[str, str]]:
     for name in dict.fromkeys([*judge_.claims, *(limit.metric for limit in judge_.limits)]):
         claim, limit = judge_.claims.get(name), judge_.limit(name)
         silent = (limit is None and claim is None) or (limit is not None and limit.known)
-        if name in ("*", "audit") or silent or (name == "rate_residual" and judge_.blurred):
+        if name in ("*", "audit") or silent:
             continue
         expected, most = 0.0 if claim is None else claim.expected, 0.0 if limit is None else limit.value
         beside = BESIDE * (most or abs(expected) or 1.0)

@@ -37,9 +37,16 @@ def wrong() -> Iterator[Found]:
 
 def _asked() -> Iterator[Found]:
     """Ask all of them."""
-    from crossbody.reports.judging import known_answers, known_parts, known_steps, known_tables
+    from crossbody.reports.judging import (
+        known_answers,
+        known_growth,
+        known_parts,
+        known_sides,
+        known_steps,
+        known_tables,
+    )
 
-    for kind in (known_answers, known_parts, known_steps, known_tables):
+    for kind in (known_answers, known_sides, known_growth, known_parts, known_steps, known_tables):
         yield from kind.wrong()
 
 

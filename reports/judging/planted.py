@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats, distinct
-from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.equations import equations, spread
 from crossbody.reports.measuring.friction import slips
+from crossbody.reports.measuring.scale import rounded
 from crossbody.reports.measuring.truth import taken
 
 PART = 0.02
@@ -151,6 +152,11 @@ def positions(plain: Plain) -> Iterator[Control]:
                 run=plain.off("q", (i, j), sign * size),
                 sees={"position": ((1.0 - SLACK) * PART, (1.0 + SLACK) * most)},
             )  # fmt: skip
+        yield Control(
+            fault=f"{case.coordinates[j].name} off by {size:.3g} {case.coordinates[j].unit} at the end",
+            run=plain.off("q", (len(run.t) - 1, j), size),
+            sees={"position": ((1.0 - SLACK) * PART, (1.0 + SLACK) * most)},
+        )  # fmt: skip
     for j in case.quaternions[:DRAWN]:
         for i in plain.samples()[:1]:
             turned = _with(run, "q", (i, slice(j, j + 4)), _turned(run.q[i, j : j + 4], plain.draw.normal(size=3)))
@@ -202,6 +208,8 @@ def gaps(plain: Plain) -> Iterator[Control]:
     run, rows = plain.run, plain.normal
     closed = np.flatnonzero(~plain.case.law.unilateral & (plain.case.law.a0 > 0.0))
     least = TINY * max(1.0, float(np.max(np.abs(run.q))))
+    looked = spread(run)
+    size = max(float(np.max(np.abs(run.gap[looked]), initial=0.0)), rounded(run.q[looked]))
     for k in plain.some(rows):
         some = PART * max(float(np.max(np.abs(run.gap[:, rows]))), RESTS, least)
         every = PART * max(float(np.max(np.abs(run.gap))), least)
@@ -214,7 +222,8 @@ def gaps(plain: Plain) -> Iterator[Control]:
             )  # fmt: skip
             yield Control(
                 fault=f"the gap of row {k} {sign * every:.3g} off for some samples",
-                run=plain.off("gap", (slice(i, i + wide), k), sign * every), sees={"gap_residual": roughly(PART)},
+                run=plain.off("gap", (slice(i, i + wide), k), sign * every),
+                sees={"gap_residual": exactly(every / size)},
             )  # fmt: skip
     for k in plain.some(rows)[:1]:
         deep = PART * max(float(np.max(np.abs(run.gap))), RESTS) + float(np.max(-run.gap[:, rows], initial=0.0))
@@ -249,7 +258,7 @@ def energies(plain: Plain) -> Iterator[Control]:
             )  # fmt: skip
     for size in (PART, -PART) if kinetic > 0.0 else ():
         more = plain.off("energy", (slice(None), 0), size * run.energy[:, 0])
-        yield Control(fault=f"kinetic energy {size:g} too large", run=more, sees={"energy_residual": roughly(PART)})
+        yield Control(fault=f"kinetic energy {size:g} too large", run=more, sees={"energy_residual": exactly(PART)})
 
 
 FORCED = {2.0: "doubled", 0.0: "left out"}
@@ -317,9 +326,11 @@ def _laws(plain: Plain, least: float) -> Iterator[Control]:
         return
     if not _acts(plain.case, few, int(at[0]), int(at[1])):
         return
+    # Friction of what slides is the run's own, and of rows that depend on others a part counts.
+    twice = roughly(1.0) if plain.case.rubs or plain.case.general else exactly(1.0)
     for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
         other = replace(few, lam=times * few.lam)
-        yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": roughly(1.0)}, plain=few)
+        yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": twice}, plain=few)
         one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + sign * MUCH) * few.lam[at])
         seen = (TENTH * MUCH, ROUGH * MUCH)
         yield Control(
@@ -383,6 +394,7 @@ def modes(plain: Plain) -> Iterator[Control]:
         for i in plain.samples(presses)[:1]:
             freed = _with(run, "mode", (i, int(k)), Mode.FREE)
             yield Control(fault=f"row {k} presses while FREE", run=freed, sees={"mode_contradicted": exactly(1.0)})
+    yield from _misnamed(run)
     rows, ways, bound = _bounds(plain.case, run)
     for k, row in enumerate(rows):
         slides = still & (run.mode[:, row] == Mode.SLIP) & (bound[:, k] > FAR * float(np.max(np.abs(run.lam))))
@@ -391,6 +403,23 @@ def modes(plain: Plain) -> Iterator[Control]:
             held = _with(run, "mode", (i, int(row)), Mode.STICK)
             yield Control(fault=f"row {row} slips while STICK", run=held, sees={"mode_contradicted": exactly(1.0)})
             return
+
+
+def _misnamed(run: Trajectory) -> Iterator[Control]:
+    """Call what is below the surface behind a contact as if a collision had ended there, and the other way about."""
+    swapped = {Mode.BALLISTIC: Mode.COLLISION_SEPARATION, Mode.COLLISION_SEPARATION: Mode.BALLISTIC}
+    ends = {Mode.BALLISTIC: Mode.COLLISION, Mode.COLLISION_SEPARATION: Mode.CONTACT}
+    odd = [e for e in run.events if e.after in ends and e.before not in (ends[e.after], Mode.FREE)
+           and sum(abs(e.t - other.t) == 0.0 for other in run.events) == 1]  # fmt: skip
+    if odd:
+        names = np.arange(len(Mode))
+        names[list(swapped)] = list(swapped.values())
+        events = tuple(
+            replace(e, before=swapped.get(e.before, e.before), after=swapped.get(e.after, e.after)) for e in run.events
+        )
+        other = replace(run, mode=names[run.mode].astype(run.mode.dtype), events=events)
+        sees = {"mode_residual": (float(len(odd)), float(len(run.events)))}
+        yield Control(fault="rows below their surface called by another name", run=other, sees=sees)
 
 
 def _slips(plain: Plain, i: int, way: slice) -> bool:
@@ -600,7 +629,7 @@ def _rubbed(plain: Plain, i: int, k: int) -> Iterator[Control]:
     if len(own) == 2:
         c, s = np.cos(TENTH), np.sin(TENTH)
         turned = _with(few, "lam", (i, ways[k]), np.array([[c, -s], [s, c]]) @ own)
-        sees = {"friction_angle": roughly(TENTH)}
+        sees = {"friction_angle": exactly(TENTH)}
         yield Control(fault=f"{said} turned by {TENTH:g} rad", run=turned, plain=few, sees=sees)
 
 

@@ -50,7 +50,7 @@ WIDEST = 1e-3
 """To which such a limit grows at most: a tenth of what a fault of one per cent makes of a motion, or a claim."""
 LOOSEST = 1e3
 """So many times the tolerance that limits are for widen them at most: beyond, an error may be as large as a fault's."""
-EXACT = IDENTITIES - GROWING | {"energy_residual", "gap_residual"}
+EXACT = IDENTITIES - GROWING
 """Metrics of a run against itself: neither a tolerance nor a horizon widens their limits."""
 TINY = 1e-300
 """In place of a tolerance of an audit that is zero: any difference is beyond it."""
@@ -152,6 +152,8 @@ class Judge:
         found = limit_for(self.limits, metric, self.entry.engine, self.entry.profile)
         if found is None or metric in EXACT:
             return found
+        if metric in self.untold:
+            return None
         grows, longer, looser = self.truth.grows, self.longer, min(self.looser, LOOSEST)
         times, why = longer * looser, found.why
         if metric in GROWING:
@@ -170,23 +172,19 @@ class Judge:
         return self.looser > LOOSEST or (stated < WIDEST < stated * self.looser)
 
     @cached_property
-    def blurred(self) -> bool:
-        """Whether the truth's own samples are too far apart for rates that change as fast as those of stiff rows."""
-        limit = self.limit("rate_residual")
+    def untold(self) -> Mapping[str, str]:
+        """What samples of this run, or of its truth, are too far apart to tell, and why."""
+        stated = limit_for(self.limits, "rate_residual", self.entry.engine, self.entry.profile)
         own = metrics.load("rate_residual").measure(self.truth, self.truth.trajectory, self.case)
-        return limit is not None and own is not None and own > limit.value
+        if self.looser > 1.0:
+            return {"rate_residual": "At the requested tolerance its samples are too far apart."}
+        if stated is not None and own is not None and own > stated.value:
+            return {"rate_residual": "Rates change between samples: those of the truth do not tell its own way."}
+        return {}
 
     def told(self, metric: str, word: Word, why: str) -> tuple[Word, str]:
         """What is said of a number: one outside is not judged where a tolerance was asked for that hides any fault."""
-        stands = metric in EXACT or metric == "law_residual"
-        if word is Word.OUTSIDE and metric == "rate_residual" and self.looser > 1.0:
-            return Word.INFO, "At the requested tolerance its samples are too far apart."
-        if word is Word.OUTSIDE and metric == "rate_residual" and self.blurred:
-            return (
-                Word.INFO,
-                "Rates change between samples: those of the truth do not tell its own way.",
-            )
-        if word is not Word.OUTSIDE or stands or not self.hides():
+        if word is not Word.OUTSIDE or metric in EXACT or metric == "law_residual" or not self.hides():
             return word, why
         return Word.INFO, "The requested tolerance allows errors as large as those of a fault."
 
@@ -215,7 +213,8 @@ class Judge:
         most = band(stored, limit, claim)
         kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST
         return self.row(
-            metric, value, unit, word, why or (against.source if against is not self.truth else ""),
+            metric, value, unit, word,
+            why or self.untold.get(metric, "") or (against.source if against is not self.truth else ""),
             expected=math.nan if claim is None else claim.expected,
             limit=limit.value if limit else math.nan if claim is None else 0.0,
             tier=against.tier.value if claim is None else claim.tier.value,

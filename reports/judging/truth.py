@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, CaseUnsupported, Chaos, EngineUnavailable, Outcome, Tier, Trajectory, arguments
 from crossbody.cases.arrays import Floats
+from crossbody.cases.contacts import CLOSED
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reference import ahead
@@ -264,8 +265,20 @@ def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], 
         count = int(np.searchsorted(t, run.t[-1], side="right")) if len(run.t) else 0
         apart = np.zeros(len(t))
         apart[:count] = np.max(differences(run.q[:count], exact[:count], case.quaternions), axis=1)
-        most = np.maximum(most, np.maximum.accumulate(apart) / (off * case.t_end))
+        most = np.maximum(most, grown(t, apart, off))
     return t, most
+
+
+def grown(t: Floats, apart: Floats, off: float) -> Floats:
+    """Return by how much more than in free flight an error of the start has grown until instants (n,).
+
+    Args:
+        t (n,): instants from the start to the horizon, s.
+        apart (n,): how far two motions are apart, m or rad.
+        off: by what their velocities differ at the start, m/s or rad/s.
+    """
+    largest: Floats = np.maximum.accumulate(apart) / (off * t[-1])
+    return largest
 
 
 def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
@@ -342,4 +355,23 @@ def agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
     if len(second.t) and truth.trusted < second.t[-1]:
         second = before(second, truth.trusted)
     found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
+    if truth.tier is Tier.C and not case.general:  # of a scene, rows that share a load may switch in any order
+        found["modes"] = _other_modes(truth, second, case)
     return {name: value for name, value in found.items() if value is not None}
+
+
+def _other_modes(truth: Truth, second: Trajectory, case: Case) -> float:
+    """Return how many modes of samples differ, away from the events of both, of rows that both know.
+
+    Whether what pushes nothing is just below its surface, or free just above it, rounding decides.
+    """
+    from crossbody.reports.measuring.alignment import aligned
+
+    inside, exact = aligned(truth, second)
+    t, mode = second.t[inside], second.mode[inside]
+    flat = np.abs(exact.gap) <= PARTED * float(np.max(np.abs(exact.gap), initial=0.0))
+    told = ~flat | np.isin(exact.mode, CLOSED) | np.isin(mode, CLOSED)
+    events = np.array([event.t for event in (*truth.trajectory.events, *second.events)])
+    near = np.searchsorted(np.sort(events), t + np.array([[PARTED], [-PARTED]]) * case.t_end)
+    other = (exact.mode >= 0) & (mode >= 0) & (exact.mode != mode) & told
+    return float(np.sum(other[near[0] == near[1]]))

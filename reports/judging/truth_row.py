@@ -21,13 +21,15 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     known = case.chaos or truth.horizon
     until = case.t_end if known is None else min(known.until, case.t_end)
     value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
-    short = truth.trusted < until
+    short, other = truth.trusted < until, int(truth.agreement.get("modes", 0.0))
     told = [] if known is None else [f"Known up to {until:.4g} s: {known.why}."]
     told.append(f"{truth.source}.")
     if many := truth.trajectory.counts.get("not_searched", 0):
         told.append(
             f"At {many} instant{'s' * (many > 1)} too many contacts could change to search for a second motion."
         )
+    if other:
+        told.append(f"At {other} samples its two sources have rows in other modes.")
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
     if truth.part < 1.0:
@@ -38,7 +40,7 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     return [Verdict(
         case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",
         limit=truth.allowed, tier=truth.tier.value, why=" ".join(told), command=command,
-        verdict=Word.WITHIN if value <= truth.allowed and not short else Word.OUTSIDE,
+        verdict=Word.WITHIN if value <= truth.allowed and not short and not other else Word.OUTSIDE,
         regression=Regression.LOST if lost else "",
         compared=truth.part * min(truth.trusted / case.t_end, 1.0),
     )]  # fmt: skip

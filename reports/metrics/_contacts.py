@@ -26,6 +26,8 @@ UNITS = {
     "slip_times": "s", "stick_times": "s",
 }  # fmt: skip
 NEEDS = {"mode_contradicted": "lam"}
+WAYS = 2.0
+"""So many of its longest ways between samples a row may be above its surface where an engine finds it late."""
 KNOWN = 1e-6
 """Part of the largest to which limits hold gaps and what releases leave of multipliers."""
 SHALLOW = 1e-12
@@ -118,9 +120,10 @@ def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None
     between samples though the run has BALLISTIC ones (engines without call any FREE that does not push), or a closed
     one is above by as much and bears nothing; at which friction is called SLIP below half its bound, STICK beyond one
     and a half times it (pyramids in and around a cone of friction are within the root of two), or STICK at its bound
-    while it slips. Samples beside events are left out: a step has the force of either side. It asks nothing of the
-    truth or the law. None without rows and where modes are not known, NaN where lam is not; rows that are always on
-    and follow from others have none.
+    while it slips. Touches of a row that is far above its surface count too: none begins there in any engine. Samples
+    beside events are left out: a step has the force of either side. It asks nothing of the truth or the law. None
+    without rows and where modes are not known, NaN where lam is not; rows that are always on and follow from others
+    have none.
     """
     if not run.mode.size or (run.mode < 0).any() or len(run.t) < 2:
         return None
@@ -135,7 +138,17 @@ def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None
     closed = np.isin(mode, CLOSED)
     below = (mode == Mode.FREE) & (gap < -near) & (run.mode == Mode.BALLISTIC).any()
     wrong = (~closed & bears) | below | (closed & (gap > near) & ~bears)
-    return float(np.sum(wrong[quiet]) + np.sum(_other_friction(run, case, light)[quiet]))
+    other = np.sum(wrong[quiet]) + np.sum(_other_friction(run, case, light)[quiet])
+    return float(other + _touching_nothing(run, np.flatnonzero(rows).tolist(), near))
+
+
+def _touching_nothing(run: Trajectory, rows: list[int], near: Floats) -> int:
+    """Count touches of rows that are above their surface by more than two of their longest ways between samples."""
+    least = {row: WAYS * float(way) for row, way in zip(rows, near, strict=True)}
+    touches = [e for e in run.events if e.contact in least and e.before == Mode.FREE and e.after in CLOSED]
+    at = np.searchsorted(run.t, [e.t for e in touches], side="right").clip(1, len(run.t) - 1)
+    around = [run.gap[max(i - 2, 0) : i + 1, e.contact] for i, e in zip(at.tolist(), touches, strict=True)]
+    return sum(float(np.min(gap)) > least[e.contact] for gap, e in zip(around, touches, strict=True))
 
 
 def _between_events(run: Trajectory) -> NDArray[np.bool_]:

@@ -106,7 +106,7 @@ def test_limits_are_as_they_stand_but_for_what_was_asked_for(
     ((case, found),) = rows("bouncing_ball", "listing", factor, [rtol], "reference:compiled")
     for row in found:
         stands = limit_for(limits_of(case), row.metric, row.engine, row.profile)
-        if stands is None:
+        if stands is None or (row.metric == "rate_residual" and np.isnan(row.limit)):  # its samples tell nothing
             continue
         times = 1.0 if row.metric in EXACT else growing if row.metric in GROWING else wider
         assert row.limit == pytest.approx(max(stands.value, min(stands.value * times, 1e-3)), rel=1e-9), row.metric

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,23 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Trajectory
-from crossbody.reports.judging import judge_controls, known_answers, known_parts, known_steps, known_tables, parts
+from crossbody.reports.judging import (
+    judge_controls,
+    known_answers,
+    known_growth,
+    known_parts,
+    known_sides,
+    known_steps,
+    known_tables,
+    parts,
+    truth,
+)
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.truth import shortened
+from crossbody.reports.metrics import event_gap
 
-KNOWN = (known_answers, known_parts, known_steps, known_tables)
+KNOWN = (known_answers, known_growth, known_parts, known_sides, known_steps, known_tables)
 
 
 @pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
@@ -52,6 +64,33 @@ def test_parts_that_are_others_are_told(name: str, monkeypatch: pytest.MonkeyPat
         assert bool(known_parts.wrong()) == (name != "_most")  # by which is said to what parts are known alone
     finally:
         known_parts.wrong.cache_clear()
+
+
+def test_an_instant_that_stands_twice_is_read_before_what_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Behind it every row is where it must be: a multiplier of .3 N that a release cuts off was none."""
+    own = np.searchsorted
+
+    def behind(*given: Any, side: str = "left", **more: Any) -> Any:
+        return own(*given, side="right", **more) - 1 + (own(*given, side="right") == own(*given, side="left"))
+
+    monkeypatch.setattr(event_gap, "np", SimpleNamespace(**{**vars(np), "searchsorted": behind}))
+    known_sides.wrong.cache_clear()
+    try:
+        assert {name for name, *_ in known_sides.wrong()} == {"event_gap"}
+    finally:
+        known_sides.wrong.cache_clear()
+
+
+@pytest.mark.parametrize("times", [2.0, 0.1])
+def test_growth_that_depends_on_the_unit_of_time_is_told(times: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    for end in (times, None):
+        known_growth.wrong.cache_clear()
+        monkeypatch.setattr(
+            known_growth, "grown",
+            lambda t, apart, off, end=end: truth.grown(t, apart, off) * (t[-1] if end is None else end),
+        )  # fmt: skip
+        assert known_growth.wrong()
+    known_growth.wrong.cache_clear()
 
 
 def test_steps_that_err_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,6 +53,22 @@ def robot(folder: Path, text: str, **given: float) -> Case:
     return cases.from_file(path, **given)
 
 
+@pytest.mark.parametrize(("name", "off"), [("a0", 1.05), ("a1", 0.95)])
+def test_the_law_of_a_file_is_that_of_mujoco_itself(name: str, off: float, tmp_path: Path) -> None:
+    """A stiffness by the square of dmax was 5 % off in every row of a file, and no run told."""
+    path = cases.from_file(robot(tmp_path, FIVE_BAR).file)
+    scene = path.scene
+    assert scene is not None
+    loop = scene.loops[0]
+    law = replace(loop.law, **{name: off * getattr(loop.law, name)})
+    shown = engines.load("mujoco").prepare(path, "as_is").audit()
+    other = replace(path, scene=scene.replace(loops=(replace(loop, law=law),)))
+    for case, same in ((path, True), (other, False)):
+        (row,) = (row for row in audit.audit(shown, {}, case) if row.quantity == "law")
+        assert row.ok == same
+        assert same or row.difference == pytest.approx(abs(1.0 / off - 1.0), rel=1e-9)
+
+
 def wrong(case: Case, profile: str = "compiled") -> list[tuple[str, str, float, str]]:
     """Engine, metric, number and reason of every row that is outside of a case in the reference."""
     result = jobs.run_case(case, (jobs.Pick(engine="reference", profile=profile, every=False),), budget=2.0)

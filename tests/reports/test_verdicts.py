@@ -24,11 +24,21 @@ from crossbody.reports.judging import run_verdicts, stored, verdict
 from crossbody.reports.judging.audit import AuditRow, audit, difference, states
 from crossbody.reports.judging.comparison import compare, judged
 from crossbody.reports.judging.parts import Split
-from crossbody.reports.judging.run_verdicts import Entry
+from crossbody.reports.judging.run_verdicts import Entry, Judge
 from crossbody.reports.judging.stored import deviations
 from crossbody.reports.judging.truth import _held_against, truth_of
 from crossbody.reports.judging.truth_row import truth_row
-from crossbody.reports.judging.verdict import FACTOR, Regression, Word, as_stored, band, exit_code, judge, limit_for
+from crossbody.reports.judging.verdict import (
+    FACTOR,
+    IDENTITIES,
+    Regression,
+    Word,
+    as_stored,
+    band,
+    exit_code,
+    judge,
+    limit_for,
+)
 from crossbody.reports.measuring.truth import TRUTH, from_run
 from crossbody.reports.runs import jobs
 from crossbody.reports.runs.choice import picks
@@ -624,13 +634,35 @@ def test_the_largest_difference_counts() -> None:
     assert difference([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]) == 0.25
 
 
-@pytest.mark.parametrize("metric", ["start_error", "mode_residual", "event_gap"])
+@pytest.mark.parametrize("metric", sorted(IDENTITIES))
 def test_no_known_property_explains_what_a_run_says_of_itself(metric: str) -> None:
     for each in (load(name, variant) for name in cases_.names() for variant in cases_.variants(name)):
         limits = limits_of(each)
         for one in limits:
             found = limit_for(limits, metric, one.engine, one.profile)
-            assert found is None or not found.known, (each.label, one.engine, one.profile)
+            told = found is not None and found.known_least > 0.5 * found.known_size
+            assert found is None or not found.known or told, (each.label, one.engine, one.profile)
+
+
+@pytest.mark.parametrize("metric", ["energy_residual", "gap_residual"])
+@pytest.mark.parametrize("label", ["tossed_cube:loaded", "newtons_cradle:pendulums", "held_weight:slips"])
+def test_energies_and_gaps_beside_the_state_are_outside_at_parameters_that_are_not_stored(
+    label: str, metric: str
+) -> None:
+    """DART's weight at a body's origin for its centre, an energy .05 off, was not judged for .2 s of a tossed cube."""
+    each = replace(load(*label.split(":")), t_end=0.2)
+    for engine in ("mujoco", "dart", "drake"):
+        judge_ = Judge(each, Entry(engine=engine, profile="default"), truth_of(load("bouncing_ball", "linear")), "")
+        assert judge_.judged(metric, 0.046, "1", judge_.truth, 1.0).verdict == Word.OUTSIDE
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.045])
+def test_the_energy_by_which_spheres_turn_on_their_strings_is_known_on_both_sides(radius: float) -> None:
+    each = load("newtons_cradle", "pendulums", radius=radius)
+    judge_ = Judge(each, Entry(engine="mujoco", profile="default"), truth_of(load("bouncing_ball", "linear")), "")
+    turning = 0.4 * (radius / each.number("length")) ** 2
+    for times, word in ((1.0, Word.EXPECTED), (1.01, Word.OUTSIDE), (0.99, Word.OUTSIDE), (0.0, Word.OUTSIDE)):
+        assert judge_.judged("energy_residual", times * turning, "1", judge_.truth, 1.0).verdict == word
 
 
 def test_every_case_is_limited_in_all_that_it_has() -> None:

@@ -18,6 +18,7 @@ from crossbody.cases.mechanisms.cradle.rules import answer
 from crossbody.cases.trajectory import Trajectory
 
 SLOW = 1e-6  # a gap that closes slower than this part of the speed that came in stands still
+NEAR = 1e-6  # part of an energy of turning by which the recorded one may be another
 SHUT = 1e-3  # a gap deeper than this part of speed/sqrt(a0) still pushes, in a run without modes
 
 
@@ -193,10 +194,19 @@ _STEP: Mapping[tuple[str, str], tuple[float, str]] = {
 """Sliders: largest error of position against the engine's own equations (twice what was measured)."""
 
 
-def limits(mechanism: str, rule: str, gap: float, claims: Iterable[Claim]) -> tuple[Limit, ...]:
-    """The limits of one mechanism under one rule, with a gap between neighbours at rest, m; claims are counts."""
+def limits(
+    mechanism: str, rule: str, gap: float, claims: Iterable[Claim], turning: float = 0.0
+) -> tuple[Limit, ...]:  # fmt: skip
+    """The limits of one mechanism under one rule, with a gap between neighbours at rest, m; claims are counts.
+
+    `turning` is the part of the energy of balls on strings that is theirs of turning, if they are spheres.
+    """
     counts = {claim.metric: (0.0, "a count") for claim in claims}
-    return tuple(_all(mechanism, rule, {**_bounds(mechanism, rule, gap), **counts}))
+    turned = Limit(
+        metric="energy_residual", value=1e-9, engine="mujoco", profile="default", known=OBVIOUS,
+        known_least=(1.0 - NEAR) * turning, known_size=(1.0 + NEAR) * turning,
+    )  # fmt: skip
+    return (*_all(mechanism, rule, {**_bounds(mechanism, rule, gap), **counts}), *((turned,) if turning else ()))
 
 
 def _bounds(mechanism: str, rule: str, gap: float) -> Bounds:

@@ -87,6 +87,11 @@ def _arrival(parameters: Mapping[str, Value], mechanism: str) -> float:
     return 2.0 * math.sqrt(g * length) * abs(math.sin(0.5 * angle))
 
 
+def turning(parameters: Mapping[str, Value]) -> float:
+    """Return the energy by which balls on strings turn, if they are spheres, over the rest of their kinetic energy."""
+    return 0.4 * (float(parameters["radius"]) / float(parameters["length"])) ** 2
+
+
 def law(balls: Row, collisions: str) -> RowLaw:
     """Return the constants of every row.
 
