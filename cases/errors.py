@@ -14,7 +14,7 @@
     +-- OutputError         a folder that cannot be written, or that holds something of somebody else's
     +-- SchedulerUnavailable  a cluster that does not answer
 
-Numerical failure is never an exception: it is an `Outcome`.
+Numerical failure is never an exception: it is an `Outcome`. What crossbody finds wrong with itself is an `OwnFault`.
 """
 
 from __future__ import annotations
@@ -52,6 +52,10 @@ class CrossbodyError(Exception):
     def __reduce__(self) -> Any:
         """Return how another process makes it again: what a subclass takes is not its sentence."""
         return _again, (type(self), self.args, self.__dict__)
+
+
+class OwnFault(RuntimeError):  # noqa: N818
+    """A fault of crossbody's own that a check of its own has found: nobody has used it wrongly."""
 
 
 def _again(kind: type[CrossbodyError], told: tuple[Any, ...], state: dict[str, Any]) -> CrossbodyError:

@@ -16,6 +16,10 @@ AROUND, INSIDE = (np.nan, 3.3), (1234567.25, -7654321.5)  # beyond the arrays an
 DEBUG = "With CROSSBODY_DEBUG=1 in the environment kernels check every index."
 
 
+class KernelError(SceneError):
+    """A kernel that is not what it says, whatever the numbers of the scene: whoever wrote it made the mistake."""
+
+
 @dataclass(frozen=True, slots=True)
 class GuardedCall:
     """One kernel and its arguments.
@@ -40,7 +44,7 @@ class GuardedCall:
         """Call the kernel twice, with other values beyond its arrays and in what it must fill; return what it filled.
 
         Raises:
-            SceneError: naming kernel, array and entry, if it writes what it may only read, reads
+            KernelError: naming kernel, array and entry, if it writes what it may only read, reads
                 or writes beyond an array, or leaves an entry unfilled.
         """
         first, second = (self._call(dict.fromkeys(self.order, AROUND[i]), INSIDE[i]) for i in range(2))
@@ -48,10 +52,10 @@ class GuardedCall:
             a, b = first[name], second[name]
             unfilled = np.isnan(wanted) & (a == INSIDE[0]) & (b == INSIDE[1])
             if np.any(unfilled):
-                raise SceneError(f"Kernel {self.name} leaves {entry(name, unfilled)} unfilled; it fills every entry.")
+                raise KernelError(f"Kernel {self.name} leaves {entry(name, unfilled)} unfilled; it fills every entry.")
             differs = ~((a == b) | (np.isnan(a) & np.isnan(b)))
             if np.any(differs):
-                raise SceneError(self._origin(name, entry(name, differs)))
+                raise KernelError(self._origin(name, entry(name, differs)))
         return first
 
     def _call(self, around: Mapping[str, float], inside: float) -> dict[str, Floats]:
@@ -67,13 +71,13 @@ class GuardedCall:
         try:
             self.kernel(*arguments)
         except IndexError as error:
-            raise SceneError(f"Kernel {self.name} reads or writes beyond an array: {error}.") from None
+            raise KernelError(f"Kernel {self.name} reads or writes beyond an array: {error}.") from None
         for name, (line, array) in lines.items():
             expected, _ = _line(array, around[name])
             if line.tobytes() != expected.tobytes():
-                raise SceneError(f"Kernel {self.name} writes beyond {name}, whose shape is {array.shape}. {DEBUG}")
+                raise KernelError(f"Kernel {self.name} writes beyond {name}, whose shape is {array.shape}. {DEBUG}")
             if name in self.inputs and array.tobytes() != self.inputs[name].tobytes():
-                raise SceneError(f"Kernel {self.name} writes {name}, which is read-only.")
+                raise KernelError(f"Kernel {self.name} writes {name}, which is read-only.")
         return {name: lines[name][1] for name in self.outputs}
 
     def _origin(self, name: str, where: str) -> str:

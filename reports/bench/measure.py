@@ -20,6 +20,7 @@ import pandas as pd
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Trajectory
+from crossbody.cases.errors import OwnFault
 from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
@@ -107,7 +108,7 @@ def _first(case: Case, pick: Pick, run: Any) -> tuple[Trajectory, str]:
     """The warm-up of a rung, and what it threw: the lines of the others are measured all the same."""
     try:
         return run.run(), ""
-    except CrossbodyError:  # wrong use of ours
+    except (CrossbodyError, OwnFault):  # wrong use of ours, or a fault
         raise
     except (Exception, SystemExit) as error:
         crashed = crash(error)

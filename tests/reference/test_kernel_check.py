@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +18,7 @@ from places import helped
 
 from crossbody import cases
 from crossbody.cases import SceneError
+from crossbody.cases.errors import OwnFault
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape, Tendon
 from crossbody.engines.equations import system_of
 from crossbody.reference import Options, System, _check, kernels, prepare, simulate
@@ -202,6 +204,26 @@ def test_a_kink_is_no_fault(at):
     )  # fmt: skip
     for seed in range(5):
         check_kernels(system, np.array([at]), np.zeros(1), seed=seed)
+
+
+def test_only_kernels_that_somebody_else_wrote_are_his_fault():
+    """Of crossbody's own kernels one that contradicts the others is a fault of crossbody."""
+    case = cases.load("bouncing_ball")
+    system, other = system_of(case), system_of(cases.load("newtons_cradle", "sliders"))
+    start, own = (np.array(case.q0), np.array(case.v0), 1.0), kernels.gaps(_gaps.py_func)
+    with pytest.raises(OwnFault, match="Kernel rows"):
+        simulate(replace(system, rows=other.rows), *start)
+    for changes in ({"rows": other.rows, "gaps": own}, {"gaps": own}):
+        with pytest.raises(SceneError, match="Kernel"):
+            simulate(replace(system, **changes), *start)
+
+
+@pytest.mark.parametrize("mass", [-1.0, 1e308])
+def test_a_number_that_no_mechanism_has_is_no_fault_of_a_kernel(mass):
+    system = system_of(cases.load("bouncing_ball"))
+    changed = replace(system, parameters={**system.parameters, "mass": mass})
+    with pytest.raises(SceneError, match="Kernel dynamics gives"):
+        simulate(changed, np.ones(1), np.zeros(1), 1.0)
 
 
 def test_a_run_checks_its_system_once(monkeypatch):
