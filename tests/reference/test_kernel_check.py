@@ -304,7 +304,7 @@ def test_every_shipped_kernel_stays_inside_its_arrays(tmp_path):
     assert done.returncode == 0, done.stderr
     count, found = done.stdout.splitlines()
     assert int(count) == len(VARIANTS)
-    assert found.startswith("SceneError Kernel energy reads or writes beyond an array: index")
+    assert found.startswith("KernelError Kernel energy reads or writes beyond an array: index")
 
 
 def test_with_debugging_on_kernels_check_their_indices(tmp_path):
@@ -314,7 +314,7 @@ def test_with_debugging_on_kernels_check_their_indices(tmp_path):
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("SceneError Kernel energy reads or writes beyond an array: index")
+    assert done.stdout.startswith("KernelError Kernel energy reads or writes beyond an array: index")
 
 
 @pytest.mark.parametrize("bend", 10.0 ** np.arange(-5, 1))
