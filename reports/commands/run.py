@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,11 +9,10 @@ from time import perf_counter
 
 import click
 
-from crossbody.cases import Case, installed
-from crossbody.cases.loading import OF_USERS, parted
+from crossbody.cases import Case
 from crossbody.reference.compiling import count
 from crossbody.reports import voice
-from crossbody.reports.commands import planned
+from crossbody.reports.commands import planned, repeated
 from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging.audit import SEED
@@ -54,9 +52,10 @@ def run(
 
         def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
             result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit, budget=budget)
-            again = pairs if result.case.t_end == cases[i].t_end else (*pairs, f"t_end={result.case.t_end:g}")
             with parts.put(key(i, cases[i])) as made:
-                rows = study.write_case(made, result, repeat(cases[i], names, again, rtol, settings))
+                again = repeated.repeat(cases[i], names, pairs, rtol, budget, result.case.t_end)
+                rows = study.write_case(made, result, again)
+                repeated.check(rows, cases[i], result, rtol, asked, budget)
             if len(cases) > 1:
                 voice.note(f"{cases[i].label}: {counted(rows)}")
             return 0
@@ -129,20 +128,6 @@ def findings(case: Case) -> tuple[str, ...]:
     if not known(case):
         return case.findings
     return (*case.findings, *equations_of(case).findings)
-
-
-def repeat(
-    case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
-) -> str:
-    """The command that reproduces the rows of one case, but for its engine."""
-    files = (name for name, _ in map(parted, names) if name.endswith(OF_USERS))
-    own = (name for name in files if case.name in (Path(name).stem, Path(name).name))
-    source = next(own, case.name)
-    words = ["crossbody", "run", source, "--variant", case.variant]
-    words += [word for pair in pairs for word in ("--set", pair)]
-    words += [word for pair in settings for word in ("--set-engine", pair)]
-    words += ["--rtol", f"{rtol:g}"] if rtol is not None else []
-    return shlex.join(words + installed.options())
 
 
 def show_controllers(out: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter, process_time
 from typing import Any, TypeVar
@@ -123,10 +124,20 @@ def run_case(
         why = watch.lost(label)
         began = _clock()
         entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine, budget)
-        entries.append(replace(entry, took_s=_clock() - began))
+        own = _own(case, pick, entry, settings or {})
+        entries.append(replace(entry, took_s=_clock() - began, asked=own))
     watch.unlimited()
     check_known(settings or {}, [(one.engine, one.profile, one.settings) for one in entries if one.run is not None])
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def _own(case: Case, pick: Pick, entry: Entry, settings: Mapping[str, Value]) -> dict[str, Value]:
+    """Return those of the settings that an engine was asked to take and has."""
+    mine, known = of_pick(settings, pick), entry.settings
+    if mine and not (known or pick.skipped):  # it did not get so far as to say which it used
+        with suppress(CaseUnsupported):
+            known = engines.load(pick.engine).offered(case, pick.profile)
+    return {name: value for name, value in mine.items() if name in known}
 
 
 def _clock() -> float:
