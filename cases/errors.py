@@ -5,6 +5,7 @@
     |   +-- NoFile          a file that does not exist
     +-- InvalidValue        a value outside what its name admits
     +-- SceneError          a mechanism whose parts contradict each other (shapes, start, constants)
+    |   +-- KernelError     a kernel that is not what it says
     +-- ControlError        a controller of the user's own that raises, or gives something else than its controls
     +-- EngineUnavailable   an engine whose third-party package is not installed
     +-- CaseUnsupported     an engine that cannot do a case, in the engine's own words
@@ -125,6 +126,10 @@ class InvalidValue(CrossbodyError, ValueError):  # noqa: N818
 
 class SceneError(CrossbodyError, ValueError):
     """A mechanism or start whose parts contradict each other."""
+
+
+class KernelError(SceneError):
+    """A kernel that is not what it says, whatever the numbers of the scene: whoever wrote it made the mistake."""
 
 
 class ControlError(CrossbodyError, ValueError):

@@ -8,16 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import SceneError
+from crossbody.cases.errors import KernelError
 from crossbody.reference.kinds import Floats
 
 GUARD = 64  # cells before and behind an array, beside as many as it has itself
 AROUND, INSIDE = (np.nan, 3.3), (1234567.25, -7654321.5)  # beyond the arrays and in what is to be filled, in two calls
 DEBUG = "With CROSSBODY_DEBUG=1 in the environment kernels check every index."
-
-
-class KernelError(SceneError):
-    """A kernel that is not what it says, whatever the numbers of the scene: whoever wrote it made the mistake."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ import gc
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +21,7 @@ import pandas as pd
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Trajectory
-from crossbody.cases.errors import OwnFault
+from crossbody.engines.equations import answering
 from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
@@ -78,10 +79,8 @@ def _rungs(
         tell(label)
         watch.limited(label, limit)
         if not pick.skipped and not watch.lost(label):
-            try:
+            with suppress(CaseUnsupported), answering(case):
                 yield from _climbed(case, pick, effort, truths)
-            except CaseUnsupported:
-                continue
 
 
 def _climbed(case: Case, pick: Pick, effort: Effort, truths: Truths) -> Iterator[Rung]:
@@ -108,7 +107,7 @@ def _first(case: Case, pick: Pick, run: Any) -> tuple[Trajectory, str]:
     """The warm-up of a rung, and what it threw: the lines of the others are measured all the same."""
     try:
         return run.run(), ""
-    except (CrossbodyError, OwnFault):  # wrong use of ours, or a fault
+    except CrossbodyError:  # wrong use of ours
         raise
     except (Exception, SystemExit) as error:
         crashed = crash(error)

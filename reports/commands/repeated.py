@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from crossbody.cases import Case, Value, installed
 from crossbody.cases.errors import OwnFault
-from crossbody.cases.loading import OF_USERS, module, parted, resolve
+from crossbody.cases.loading import module, resolve
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Row
@@ -18,33 +17,24 @@ from crossbody.reports.runs.choice import Pick, of_pick, parse_settings
 from crossbody.reports.runs.jobs import CaseResult
 
 
-def repeat(
-    case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, budget: float, t_end: float
-) -> str:
+def repeat(case: Case, source: str, pairs: Sequence[str], rtol: float | None, budget: float, t_end: float) -> str:
     """Return the command that reproduces the rows of one case, but for an engine and its settings.
 
     Args:
         case: as it was asked for.
-        names: of the cases that were asked for.
+        source: name or file by which it is loaded.
         pairs: its parameters, as they were given.
         rtol: tolerance of all engines.
         budget: of the tightest run of its truth, s.
         t_end: to which it was followed, s.
     """
-    words = ["crossbody", "run", _source(case, names), "--variant", case.variant]
+    words = ["crossbody", "run", source, "--variant", case.variant]
     if t_end != case.t_end:
         pairs = [*(pair for pair in pairs if "t_end" not in parse_settings([pair])), f"t_end={t_end!r}"]
     words += [word for pair in pairs for word in ("--set", pair)]
     words += ["--rtol", f"{rtol!r}"] if rtol is not None else []
     words += ["--budget", f"{budget!r}"] if budget != BUDGET else []
     return shlex.join(words + installed.options())
-
-
-def _source(case: Case, names: Sequence[str]) -> str:
-    """Return the file that a case is from, or its name."""
-    files = (name for name, _ in map(parted, names) if name.endswith(OF_USERS))
-    own = (name for name in files if case.name in (Path(name).stem, Path(name).name) and case.file in ("", name))
-    return next(own, case.name)
 
 
 def check(
@@ -85,9 +75,8 @@ def _read(command: str) -> Mapping[str, Any]:
 
 def _of_case(given: Mapping[str, Any], case: Case, t_end: float) -> Iterator[str]:
     """Yield what differs of a case that was followed to t_end, s."""
-    source, own = parted(given["names"][0])
-    variant, defined = given["variant"] or own, module(source)
-    if (source, variant) != (case.file or source, case.variant):
+    (source,), variant, defined = given["names"], given["variant"], module(given["names"][0])
+    if (source, variant) != (case.file or source, case.variant) or variant not in defined.VARIANTS:
         yield "case"
         return
     numbers = resolve(case.label, defined.PARAMETERS, defined.VARIANTS[variant], parse_settings(given["pairs"]))

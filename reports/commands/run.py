@@ -10,6 +10,8 @@ from time import perf_counter
 import click
 
 from crossbody.cases import Case
+from crossbody.cases.errors import OwnFault
+from crossbody.engines.equations import answering, equations_of, known
 from crossbody.reference.compiling import count
 from crossbody.reports import voice
 from crossbody.reports.commands import planned, repeated
@@ -28,18 +30,18 @@ from crossbody.reports.voice import progress
 
 
 def run(
-    cases: Sequence[Case], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str],
+    cases: Sequence[Case], sources: Sequence[str], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str],
     out: Path, rtol: float | None, settings: Sequence[str], command: str,
     against: Path | None = None, others: Sequence[Path] = (), limit: float = LIMIT,
     strict: bool = False, at_once: int = 1, budget: float = BUDGET,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
-    `cases` are those of `names`, with the parameters of `pairs`; `against` is the folder of an
-    earlier run, which may be `out` itself; `others` those of studies beside this one; `limit` is
-    the time that an engine may take for one case, s; `strict` makes a number wrong that left its
-    regression band; `at_once` is how many cases are run at once, in processes of their own;
-    `budget` is how long the tightest run of a scene may take, s.
+    `cases` are those of `names`, with the parameters of `pairs`, `sources` the name or file of
+    each; `against` is the folder of an earlier run, which may be `out` itself; `others` those of
+    studies beside this one; `limit` is the time that an engine may take for one case, s; `strict`
+    makes a number wrong that left its regression band; `at_once` is how many cases are run at
+    once, in processes of their own; `budget` is how long the tightest run of a scene may take, s.
     """
     picks, asked = planned.checked(wanted, rtol, settings, out, against, others)
     planned.check_settings(cases, picks, asked, rtol)
@@ -51,9 +53,10 @@ def run(
     with Parts(out, command, decides) as parts:
 
         def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
-            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit, budget=budget)
+            with answering(cases[i]):
+                result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit, budget=budget)
             with parts.put(key(i, cases[i])) as made:
-                again = repeated.repeat(cases[i], names, pairs, rtol, budget, result.case.t_end)
+                again = repeated.repeat(cases[i], sources[i], pairs, rtol, budget, result.case.t_end)
                 rows = study.write_case(made, result, again)
                 repeated.check(rows, cases[i], result, rtol, asked, budget)
             if len(cases) > 1:
@@ -82,7 +85,7 @@ def run(
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
 
 
-def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | None:
+def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | OwnFault | None:
     """Print the verdicts of a folder; what keeps them from being printed."""
     try:
         if voice.as_json():
@@ -91,7 +94,7 @@ def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | None:
         if controlled and not voice.quiet():
             show_controllers(made)
         show(rows, results.times_of(made))
-    except OSError as error:
+    except (OSError, OwnFault) as error:
         return error
     return None
 
@@ -123,8 +126,6 @@ def findings(case: Case) -> tuple[str, ...]:
     """Return sentences on what is strange in a case, and in the equations of a scene with loops."""
     if case.scene is None or not case.scene.loops:
         return case.findings
-    from crossbody.engines.equations import equations_of, known
-
     if not known(case):
         return case.findings
     return (*case.findings, *equations_of(case).findings)

@@ -14,7 +14,6 @@ import numpy as np
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, InvalidValue, Outcome, SceneError, Trajectory, Value
 from crossbody.cases.arguments import instance
-from crossbody.cases.errors import OwnFault
 from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
@@ -176,7 +175,7 @@ def _entry(
         return _ran(case, pick, asked, reference, refine, budget)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
-    except (CrossbodyError, OwnFault):  # wrong use of ours, or a fault
+    except CrossbodyError:  # wrong use of ours
         raise
     except (Exception, SystemExit) as error:
         return Entry(engine=pick.engine, profile=pick.profile, crashed=crash(error))

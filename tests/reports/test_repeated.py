@@ -17,6 +17,7 @@ from crossbody.cases.errors import OwnFault
 from crossbody.reports.commands import repeated
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.run_verdicts import Entry
+from crossbody.reports.runs import choice
 from crossbody.reports.runs.choice import parse_settings
 
 MOTION: Any = object()
@@ -53,7 +54,7 @@ class Drawn:
         return replace(own, asked=found)
 
     def commands(self) -> list[tuple[str, str, str]]:
-        again = repeated.repeat(self.case, (), self.pairs, self.rtol, self.budget, self.t_end)
+        again = repeated.repeat(self.case, self.case.name, self.pairs, self.rtol, self.budget, self.t_end)
         entries = [(f"{again} {self.entry(one).options}", one.engine, one.profile) for one in ENTRIES]
         return [*entries, (again, "truth", "")]
 
@@ -87,12 +88,14 @@ def test_a_word_that_is_another_one_or_lacks_is_told(seed: int) -> None:
                 drawn.check((shlex.join(changed), engine, profile))
 
 
-def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
+def test_cases_that_are_called_otherwise_than_their_files_are_told_by_these(tmp_path: Path) -> None:
     text = '<mujoco><worldbody><body name="b"><joint type="hinge"/><geom size=".1"/></body></worldbody></mujoco>'
-    paths = [tmp_path / place / "arm.xml" for place in ("a", "b")]
-    for path in paths:
+    paths = [str(tmp_path / place / "arm.xml") for place in ("a", "b")]
+    for path in map(Path, paths):
         path.parent.mkdir()
         path.write_text(text)
-    for path in paths:
-        case = load(str(path), t_end=0.5)
-        assert shlex.split(repeated.repeat(case, [*map(str, paths)], (), None, BUDGET, case.t_end))[2] == str(path)
+    assert choice.sources([*paths, "bouncing_ball:linear"], None) == (*paths, "bouncing_ball")
+    assert choice.sources([], "linear") == choice.DEFAULT_CASES
+    names = choice.sources(["newtons_cradle", *paths], None)
+    loaded = choice.load_cases(["newtons_cradle", *paths], None, {})
+    assert [case.file or case.name for case in loaded] == list(names)
