@@ -8,7 +8,7 @@ from typing import Any
 
 from crossbody.cases import Case, Value, installed
 from crossbody.cases.errors import OwnFault
-from crossbody.cases.loading import module, resolve
+from crossbody.cases.loading import build, module, resolve
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Row
@@ -79,9 +79,13 @@ def _of_case(given: Mapping[str, Any], case: Case, t_end: float) -> Iterator[str
     if (source, variant) != (case.file or source, case.variant) or variant not in defined.VARIANTS:
         yield "case"
         return
-    numbers = resolve(case.label, defined.PARAMETERS, defined.VARIANTS[variant], parse_settings(given["pairs"]))
+    pairs = parse_settings(given["pairs"])
     wanted = {**case.parameters, **({} if t_end == case.t_end else {"t_end": t_end})}
-    yield from (name for name, value in wanted.items() if numbers.get(name) != value)
+    if resolve(case.label, defined.PARAMETERS, defined.VARIANTS[variant], pairs) != wanted:
+        again = build(source, variant, pairs)  # which may have settled what is left open
+        wanted["t_end"] = t_end
+        found = {**again.parameters, "t_end": again.t_end}
+        yield from (name for name in {**wanted, **found} if found.get(name) != wanted.get(name))
 
 
 def _of_engine(given: Mapping[str, Any], entry: Entry | None, settings: Mapping[str, Value]) -> Iterator[str]:

@@ -71,21 +71,26 @@ def run(
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
             # Pages take longer than all but the engines: what they show is printed before them, and lost by nothing.
-            untold = _tell(rows, made, controlled=any(case.control is not None for case in cases))
+            times = results.times_of(made)
+            untold = _tell(rows, times, made, controlled=any(case.control is not None for case in cases))
             clock.append(perf_counter())
-            from crossbody.reports.pages import site  # after the verdicts: templates take longer to import than to fill
+            from crossbody.reports.pages import (
+                read_again,
+                site,
+            )  # after the verdicts: templates take longer to import than to fill
 
             site.write(made, against=against, others=others)
+    read_again.check(out, rows, times)
     if untold is not None:
         raise untold
     if not voice.silent():
-        show_time([*clock, perf_counter()], results.times_of(out), count.seconds - compiled)
+        show_time([*clock, perf_counter()], times, count.seconds - compiled)
     where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
 
 
-def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | OwnFault | None:
+def _tell(rows: Sequence[Row], times: results.Times, made: Path, controlled: bool) -> OSError | OwnFault | None:
     """Print the verdicts of a folder; what keeps them from being printed."""
     try:
         if voice.as_json():
@@ -93,7 +98,7 @@ def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | OwnFau
             return None
         if controlled and not voice.quiet():
             show_controllers(made)
-        show(rows, results.times_of(made))
+        show(rows, times)
     except (OSError, OwnFault) as error:
         return error
     return None
