@@ -36,15 +36,14 @@ _COUNT = re.compile(r"(\d+) ([a-z -]+?)(?: \((\d+) beyond a limit\))?(?:, |$)")
 Run = tuple[str, str]
 
 
-def check(printed: Sequence[str], rows: Sequence[Row], times: Times, width: int, quiet: bool = False) -> None:
+def check(printed: Sequence[str], rows: Sequence[Row], times: Times, width: int) -> None:
     """Hold what was printed against rows and times.
 
     Args:
-        printed: the sentence, the table, the counts, and each line below; without the first three if `quiet`.
+        printed: the sentence, the table, the counts, and each line below; not all of it if little is to be said.
         rows: verdicts of all runs.
         times: of all runs.
         width: columns that there are for the table.
-        quiet: whether the lines alone were printed.
 
     Raises:
         OwnFault: naming what is another one.
@@ -54,11 +53,9 @@ def check(printed: Sequence[str], rows: Sequence[Row], times: Times, width: int,
         who = f"{row['engine']}:{row['profile']}"
         runs.setdefault((f"{row['case']}:{row['variant']}", who), []).append(row)
     plain = [" ".join(click.unstyle(text).split()) for text in printed]
-    differing = list(_of_lines(plain[0 if quiet else 3 :], runs))
-    if not quiet:
-        table = click.unstyle(printed[1]).splitlines()
-        differing += [*_of_sentence(plain[0], runs), *_of_table(table, runs, times, width)]
-        differing += _of_counts(plain[2], rows)
+    table = click.unstyle(printed[1]).splitlines()
+    differing = [*_of_sentence(plain[0], runs), *_of_table(table, runs, times, width)]
+    differing += [*_of_counts(plain[2], rows), *_of_lines(plain[3:], runs)]
     if differing:
         raise OwnFault(f"What was printed is not what was judged: {differing[0]}.")
 

@@ -47,15 +47,15 @@ def show(rows: Sequence[Row], times: Times) -> None:
     Raises:
         OwnFault: if that is not what the rows say; it is printed all the same.
     """
-    runs, quiet = runs_of(rows), voice.quiet()
-    above = [] if quiet else [layout.told(sentence(runs)), table(runs, times, layout.columns())]
-    texts = [*above, *([] if quiet else [layout.told(counted(rows))])]
+    runs = runs_of(rows)
+    above = [layout.told(sentence(runs)), table(runs, times, layout.columns()), layout.told(counted(rows))]
     lines = [text for run in runs for text in wrong(run)]
     lines += [_lost(run, row) for run in runs for row in run.rows if row["regression"] == Regression.LOST]
-    texts += map(layout.told, [*lines, *([] if quiet else _absent(runs))])
+    texts = [*above, *map(layout.told, [*lines, *([] if voice.quiet() else _absent(runs))])]
     for i, text in enumerate(texts):
-        click.echo(text + "\n" * (i < len(above)))
-    printed.check(texts, rows, times, layout.columns(), quiet)
+        if i >= len(above) or not voice.quiet():
+            click.echo(text + "\n" * (i < len(above) - 1))
+    printed.check(texts, rows, times, layout.columns())
 
 
 def show_time(clock: Sequence[float], times: Times, compiling: float = 0.0) -> None:

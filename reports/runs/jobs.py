@@ -14,6 +14,7 @@ import numpy as np
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, InvalidValue, Outcome, SceneError, Trajectory, Value
 from crossbody.cases.arguments import instance
+from crossbody.cases.errors import OwnFault
 from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
@@ -103,6 +104,7 @@ def run_case(
     label = f"{case.label}: truth"
     tell(label)
     watch.limited(label, TRUTHS * limit)
+    started = _clock()
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} is not available. {why}")
     if truth is None and case.general and case.closed_form is None:
@@ -126,6 +128,8 @@ def run_case(
         own = _own(case, pick, entry, settings or {})
         entries.append(replace(entry, took_s=_clock() - began, asked=own))
     watch.unlimited()
+    if not (whole := sum(one.took_s for one in entries)) <= (passed := _clock() - started):
+        raise OwnFault(f"Runs of {case.label} are said to have taken {whole:.3g} s of {passed:.3g} s.")
     check_known(settings or {}, [(one.engine, one.profile, one.settings) for one in entries if one.run is not None])
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
 
