@@ -53,7 +53,7 @@ def check(printed: Sequence[str], rows: Sequence[Row], times: Times, width: int)
         who = f"{row['engine']}:{row['profile']}"
         runs.setdefault((f"{row['case']}:{row['variant']}", who), []).append(row)
     plain = [" ".join(click.unstyle(text).split()) for text in printed]
-    table = click.unstyle(printed[1]).splitlines()
+    table = click.unstyle(printed[1]).splitlines() or [""]
     differing = [*_of_sentence(plain[0], runs), *_of_table(table, runs, times, width)]
     differing += [*_of_counts(plain[2], rows), *_of_lines(plain[3:], runs)]
     if differing:

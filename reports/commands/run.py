@@ -9,7 +9,7 @@ from time import perf_counter
 
 import click
 
-from crossbody.cases import Case
+from crossbody.cases import Case, InvalidValue
 from crossbody.cases.errors import OwnFault
 from crossbody.engines.equations import answering, equations_of, known
 from crossbody.reference.compiling import count
@@ -19,7 +19,7 @@ from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.reach import BUDGET
-from crossbody.reports.judging.verdict import Row, exit_code
+from crossbody.reports.judging.verdict import Row, Word, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results
 from crossbody.reports.runs import files, jobs, output, store, study, watch
@@ -86,8 +86,21 @@ def run(
     if not voice.silent():
         show_time([*clock, perf_counter()], times, count.seconds - compiled)
     where(out)
+    _check_any(rows)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
+
+
+def _check_any(rows: Sequence[Row]) -> None:
+    """Check that some engine has run: where none has, nothing is within.
+
+    Raises:
+        InvalidValue: with why.
+    """
+    own = [row for row in rows if row["engine"] != TRUTH]
+    if all(row["verdict"] == Word.SKIPPED for row in own) and exit_code(row["verdict"] for row in rows) == 0:
+        why = " ".join(dict.fromkeys(row["why"] for row in own))
+        raise InvalidValue(f"None of the selected engines can run any of the selected cases. {why}".strip())
 
 
 def _tell(rows: Sequence[Row], times: results.Times, made: Path, controlled: bool) -> OSError | OwnFault | None:

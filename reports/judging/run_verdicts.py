@@ -410,7 +410,7 @@ def _row(
         beyond = found.verdict != Word.WITHIN and math.isfinite(value) and value > found.limit
         return replace(found, where=place(truth, run, judge_.case)) if place and beyond else found
     if name in judge_.claims:
-        return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
+        return judge_.missing(name, metric.UNIT, "The run does not tell it.", needs)
     if wanted and metric.measure(truth, truth.trajectory, judge_.case) is not None:
         return judge_.missing(name, metric.UNIT, "The run lacks this number, which the truth has.", needs)
     return None

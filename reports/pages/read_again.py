@@ -79,7 +79,7 @@ def check(out: Path, rows: Sequence[Row], times: Times) -> None:
             differing += [*_of_tiles(text, rows), *_of_known(tables, rows)]
         else:
             mine = {who: found for (label, who), found in runs.items() if label == pages[name]}
-            differing = [*_of_verdicts(tables, name, mine), *_of_glance(tables, name, mine)]
+            differing = [*_of_verdicts(tables, mine), *_of_glance(tables, mine, times, pages[name])]
             differing += _of_times(tables, pages[name], times)
         if differing:
             raise OwnFault(f"{name} does not show what was judged: {differing[0]}.")
@@ -186,13 +186,21 @@ def _of_worst(said: str, label: str, runs: Mapping[Run, Sequence[Row]]) -> Itera
     who, _, rest = said.rpartition(": ")
     metric, _, number = rest.rpartition(" ")
     mine = [row for (one, _), rows in runs.items() if one == label for row in rows]
-    ranks = [word for word in (*WORDS[:3], "not judged", "within")]
-    least = min(ranks.index(row["verdict"]) for row in mine if row["verdict"] in WORDS or beyond(row))
+    ranks = (*WORDS[:3], "not judged", "within")
+    least = min(ranks.index(row["verdict"]) for row in mine if _is_told(row))
     for row in mine:
         named = f"{row['engine']}:{row['profile']}".removesuffix(":") == who and row["metric"] == metric
         if named and ranks.index(row["verdict"]) == least and _says(number, row["value"] + 0.0, 2):
             return
     yield f"{said!r} is not the worst of {label}"
+
+
+def _is_told(row: Row) -> bool:
+    """Whether a number can be the worst of a case: it is judged, or beyond its limit, and is off."""
+    off = times_out(row)
+    return (
+        (row["verdict"] in WORDS[:2] or math.isfinite(off)) and off > 0.0 and (row["verdict"] in WORDS or beyond(row))
+    )
 
 
 def _of_engines(tables: Mapping[str, Lines], runs: Mapping[Run, Sequence[Row]], times: Times) -> Iterator[str]:
@@ -265,7 +273,7 @@ def _of_known(tables: Mapping[str, Lines], rows: Sequence[Row]) -> Iterator[str]
                 yield f"{head!r} of {who} is {cells[head].value}, not {value:.6g}"
 
 
-def _of_verdicts(tables: Mapping[str, Lines], page: str, runs: Mapping[str, Sequence[Row]]) -> Iterator[str]:
+def _of_verdicts(tables: Mapping[str, Lines], runs: Mapping[str, Sequence[Row]]) -> Iterator[str]:
     """Yield rows of a case that are not in its table as they are."""
     lines = next((found for title, found in tables.items() if title.endswith("-verdicts")), [])
     found = Counter(
@@ -284,24 +292,39 @@ def _text(value: float) -> str:
     return "" if math.isnan(value) else f"{value}"
 
 
-def _of_glance(tables: Mapping[str, Lines], page: str, runs: Mapping[str, Sequence[Row]]) -> Iterator[str]:
-    """Yield numbers at a glance that are none of their metric and engine."""
+def _of_glance(
+    tables: Mapping[str, Lines], runs: Mapping[str, Sequence[Row]], times: Times, label: str
+) -> Iterator[str]:
+    """Yield cells at a glance that are none of their metric and engine."""
     lines = next((found for title, found in tables.items() if title.endswith("-glance")), [])
     heads = [cell.name for cell in lines[1][1]] if lines else []
+    metrics = {row["metric"] for rows in runs.values() for row in rows}
     for _, (first, *cells) in lines[2:]:
-        for who, cell in zip(heads, cells, strict=True):
-            rows = {row["metric"]: row for row in runs.get(who, ())}
-            row = rows.get(max((name for name in rows if _begins(first.text, name)), key=len, default=""))
-            if row is not None and cell.value:
-                said = cell.value.removeprefix(row["verdict"]).strip()
-                value = row["known"] if abs(row["value"]) < row["known"] else row["value"]
-                if not (cell.value.startswith(row["verdict"]) and _says(said, value + 0.0, 2)):
-                    yield f"{row['metric']} of {who} is {cell.value!r} at a glance"
+        metric = max((name for name in metrics if _begins(first.text, name)), key=len, default="")
+        if len(cells) != len(heads):
+            yield f"{first.text} has {len(cells)} cells"
+        for who, cell in zip(heads, cells, strict=False):
+            wall = times.get((label, who), (0.0,))[0]
+            row = next((row for row in reversed(runs.get(who, ())) if row["metric"] == metric), None)
+            if _begins(first.text, "all judged"):
+                right = _is_run(cell.value, runs.get(who), None)
+            elif _begins(first.text, "run time"):
+                right = _lasts(" ".join(cell.value.split()[:2]), wall) if cell.value else not wall
+            else:
+                right = not cell.value if row is None else _is_value(cell.value, row)
+            if not right:
+                yield f"{first.text} of {who} is {cell.value!r} at a glance"
+
+
+def _is_value(said: str, row: Row) -> bool:
+    """Whether a cell says the verdict of a row and its number, or what that is known to where it is below."""
+    value = row["known"] if abs(row["value"]) < row["known"] else row["value"]
+    return said.startswith(row["verdict"]) and _says(said.removeprefix(row["verdict"]).strip(), value + 0.0, 2)
 
 
 def _begins(text: str, name: str) -> bool:
-    """Whether a line is that of a metric, with a unit beside it or not."""
-    return text == name or text.startswith(f"{name} [")
+    """Whether a line is that of a metric, with what stands beside it or not."""
+    return text == name or text.startswith(f"{name} ")
 
 
 def _of_times(tables: Mapping[str, Lines], label: str, times: Times) -> Iterator[str]:

@@ -86,6 +86,10 @@ def test_numbers_of_any_size_are_read_as_they_are(given_: list[tuple[float, floa
     run_shown.show(rows, times)
 
 
+def test_nothing_is_told_where_nothing_has_run() -> None:
+    run_shown.show([row(who, "run", math.nan, Word.SKIPPED) for who in ("absent:*", "other:p")], {})
+
+
 def _of_table(change: Callable[[dict[str, list[str]]], object]) -> Callable[[pytest.MonkeyPatch], None]:
     """Return a fault in the cells of the table before they are laid out."""
     own = layout.laid_out

@@ -117,6 +117,11 @@ def test_a_number_without_parts_is_blamed_on_what_is_wrong_in_the_motion(metric:
     assert f"b:matched on ball:v ({metric} 0.0005, 5e+02 times its limit{said})." in sentence(runs_of(rows))
 
 
+def test_a_share_of_the_whole_is_no_multiple_of_its_limit() -> None:
+    fit = row("a", "fit th1", -4.5e4, Word.OUTSIDE, 10.0) | {"unit": "%", "expected": 100.0}
+    assert "(fit th1 -4.5e+04 %, where at least 90 % is valid)." in sentence(runs_of([fit]))
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_what_has_no_number_is_off_the_farthest(value: float) -> None:
     rows = [row("a", "position", 1.0, Word.OUTSIDE, 1e-9), row("b", "lam_impulse", value, Word.OUTSIDE, 1.0)]
