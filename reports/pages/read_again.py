@@ -24,6 +24,7 @@ WORDS = ("crashed", "outside", "expected-outside", "within")
 """Words of what is judged, the worst first."""
 DIGITS = {1: 0.51, 2: 0.051, 3: 0.0051}
 """Part of a number by which so many digits may be another one."""
+NUMBERS = ("value", "expected", "limit", "known")
 EXACT = 1e-12
 """Part of a sum that its order changes."""
 UNITS = {"s": 1.0, "ms": 1e-3}
@@ -38,11 +39,28 @@ _NUMBER = re.compile(r"(?:< )?(-?(?:\d[\d.]*(?:e[+-]\d+)?|inf))$")
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One cell: its text, and its value and name as sorting and filtering use them; empty without."""
+    """One cell: its attributes and what it encloses."""
 
-    text: str
-    value: str
-    name: str
+    about: str
+    inner: str
+
+    @property
+    def text(self) -> str:
+        """What is shown."""
+        return " ".join(html.unescape(_TAGS.sub("", self.inner)).split())
+
+    @property
+    def value(self) -> str:
+        """What it is sorted by; empty without."""
+        return self._data("v")
+
+    @property
+    def name(self) -> str:
+        """What is in its column; empty without."""
+        return self._data("name")
+
+    def _data(self, name: str) -> str:
+        return html.unescape(dict(_DATA.findall(self.about)).get(name, ""))
 
 
 Lines = list[tuple[str, list[Cell]]]
@@ -62,7 +80,7 @@ def check(out: Path, rows: Sequence[Row], times: Times) -> None:
         OwnFault: naming the page and the number that is another one.
     """
     runs: dict[Run, list[Row]] = {}
-    rows = [{name: _finite(value) for name, value in row.items()} for row in rows]
+    rows = [row | {name: _finite(row[name]) for name in NUMBERS} for row in rows]
     for row in rows:
         who = f"{row['engine']}:{row['profile']}"
         runs.setdefault((f"{row['case']}:{row['variant']}", who), []).append(row)
@@ -73,7 +91,7 @@ def check(out: Path, rows: Sequence[Row], times: Times) -> None:
         if not index and name not in pages:
             continue
         text = (out / name).read_text(encoding="utf-8")
-        tables = {title: _lines(body) for title, body in _TABLE.findall(text)}
+        tables = dict(_TABLE.findall(text))
         if index:
             differing = [*_of_matrix(tables, runs, times), *_of_engines(tables, runs, times)]
             differing += [*_of_tiles(text, rows), *_of_known(tables, rows)]
@@ -85,22 +103,22 @@ def check(out: Path, rows: Sequence[Row], times: Times) -> None:
             raise OwnFault(f"{name} does not show what was judged: {differing[0]}.")
 
 
-def _finite(value: object) -> object:
-    """Return a value as JSON has it, where infinite is no number."""
-    return math.nan if isinstance(value, float) and math.isinf(value) else value
+def _finite(value: float) -> float:
+    """Return a number as JSON has it, where infinite is none."""
+    return value if math.isfinite(value) else math.nan
 
 
 def _lines(table: str) -> Lines:
     """Return the lines of a table, its heads among them."""
-    found: Lines = []
-    for attributes, line in _LINE.findall(table):
-        cells = []
-        for about, inner in _CELL.findall(line):
-            data = {name: html.unescape(value) for name, value in _DATA.findall(about)}
-            text = " ".join(html.unescape(_TAGS.sub("", inner)).split())
-            cells.append(Cell(text, data.get("v", ""), data.get("name", "")))
-        found.append((dict(_DATA.findall(attributes)).get("engine", ""), cells))
-    return found
+    return [
+        (dict(_DATA.findall(attributes)).get("engine", ""), [Cell(*found) for found in _CELL.findall(line)])
+        for attributes, line in _LINE.findall(table)
+    ]
+
+
+def _named(tables: Mapping[str, str], end: str) -> Lines:
+    """Return the lines of the table whose name ends so; none where there is no such table."""
+    return next((_lines(body) for title, body in tables.items() if title.endswith(end)), [])
 
 
 def counted(rows: Sequence[Row]) -> tuple[str, int, int]:
@@ -128,9 +146,9 @@ def times_out(row: Row) -> float:
     return float(off / row["limit"]) if row["limit"] > 0.0 and math.isfinite(off) else math.inf
 
 
-def _of_matrix(tables: Mapping[str, Lines], runs: Mapping[Run, Sequence[Row]], times: Times) -> Iterator[str]:
+def _of_matrix(tables: Mapping[str, str], runs: Mapping[Run, Sequence[Row]], times: Times) -> Iterator[str]:
     """Yield cells of cases and engines that are others."""
-    lines = next(found for title, found in tables.items() if title.startswith("index") and "-matrix" in title)
+    lines = _named(tables, "-matrix")
     heads = [cell.name for cell in lines[1][1]]
     if set(heads) != {who for _, who in runs}:
         yield f"its engines, {', '.join(heads)}"
@@ -203,9 +221,9 @@ def _is_told(row: Row) -> bool:
     )
 
 
-def _of_engines(tables: Mapping[str, Lines], runs: Mapping[Run, Sequence[Row]], times: Times) -> Iterator[str]:
+def _of_engines(tables: Mapping[str, str], runs: Mapping[Run, Sequence[Row]], times: Times) -> Iterator[str]:
     """Yield numbers of engines over all cases that are others."""
-    for who, cells in _by_heads(next((found for title, found in tables.items() if "-Engines" in title), [])):
+    for who, cells in _by_heads(_named(tables, "-Engines")):
         mine = {label: rows for (label, one), rows in runs.items() if one in (who, f"{who}:")}
         found = [counted(rows) for rows in mine.values()]
         words = Counter(word for word, _, total in found if total or word != "not judged")
@@ -254,9 +272,9 @@ def _of_tiles(text: str, rows: Sequence[Row]) -> Iterator[str]:
             yield f"{count} {name}, not {wanted.get(name)}"
 
 
-def _of_known(tables: Mapping[str, Lines], rows: Sequence[Row]) -> Iterator[str]:
+def _of_known(tables: Mapping[str, str], rows: Sequence[Row]) -> Iterator[str]:
     """Yield numbers of known deviations that are others."""
-    for who, cells in _by_heads(next((found for title, found in tables.items() if "-Known-" in title), [])):
+    for who, cells in _by_heads(_named(tables, "-Known-deviations")):
         why = cells["Known properties"].text
         mine = [
             row for row in rows
@@ -273,9 +291,9 @@ def _of_known(tables: Mapping[str, Lines], rows: Sequence[Row]) -> Iterator[str]
                 yield f"{head!r} of {who} is {cells[head].value}, not {value:.6g}"
 
 
-def _of_verdicts(tables: Mapping[str, Lines], runs: Mapping[str, Sequence[Row]]) -> Iterator[str]:
+def _of_verdicts(tables: Mapping[str, str], runs: Mapping[str, Sequence[Row]]) -> Iterator[str]:
     """Yield rows of a case that are not in its table as they are."""
-    lines = next((found for title, found in tables.items() if title.endswith("-verdicts")), [])
+    lines = _named(tables, "-verdicts")
     found = Counter(
         (word.value, who, metric.text, *(one.value for one in numbers))
         for who, (word, _, metric, *numbers) in ((who, cells[:6]) for who, cells in lines[1:])
@@ -292,28 +310,26 @@ def _text(value: float) -> str:
     return "" if math.isnan(value) else f"{value}"
 
 
-def _of_glance(
-    tables: Mapping[str, Lines], runs: Mapping[str, Sequence[Row]], times: Times, label: str
-) -> Iterator[str]:
+def _of_glance(tables: Mapping[str, str], runs: Mapping[str, Sequence[Row]], times: Times, label: str) -> Iterator[str]:
     """Yield cells at a glance that are none of their metric and engine."""
-    lines = next((found for title, found in tables.items() if title.endswith("-glance")), [])
+    lines = _named(tables, "-glance")
     heads = [cell.name for cell in lines[1][1]] if lines else []
-    metrics = {row["metric"] for rows in runs.values() for row in rows}
+    found = {who: {row["metric"]: row for row in rows} for who, rows in runs.items()}
     for _, (first, *cells) in lines[2:]:
-        metric = max((name for name in metrics if _begins(first.text, name)), key=len, default="")
+        metric = first.text.rsplit(" [", 1)[0]  # and its unit
         if len(cells) != len(heads):
-            yield f"{first.text} has {len(cells)} cells"
+            yield f"{metric} has {len(cells)} cells"
         for who, cell in zip(heads, cells, strict=False):
-            wall = times.get((label, who), (0.0,))[0]
-            row = next((row for row in reversed(runs.get(who, ())) if row["metric"] == metric), None)
-            if _begins(first.text, "all judged"):
-                right = _is_run(cell.value, runs.get(who), None)
-            elif _begins(first.text, "run time"):
-                right = _lasts(" ".join(cell.value.split()[:2]), wall) if cell.value else not wall
+            wall = times.get((label, who), (0.0,))[0] if who != "truth:" else 0.0  # it is no engine's
+            row, said = found.get(who, {}).get(metric), cell.value
+            if metric.startswith("all judged"):
+                right = _is_run(said, runs.get(who), None)
+            elif metric.startswith("run time"):
+                right = _lasts(" ".join(said.split()[:2]), wall) if said else not wall
             else:
-                right = not cell.value if row is None else _is_value(cell.value, row)
+                right = not said if row is None else _is_value(said, row)
             if not right:
-                yield f"{first.text} of {who} is {cell.value!r} at a glance"
+                yield f"{metric} of {who} is {said!r} at a glance"
 
 
 def _is_value(said: str, row: Row) -> bool:
@@ -322,14 +338,9 @@ def _is_value(said: str, row: Row) -> bool:
     return said.startswith(row["verdict"]) and _says(said.removeprefix(row["verdict"]).strip(), value + 0.0, 2)
 
 
-def _begins(text: str, name: str) -> bool:
-    """Whether a line is that of a metric, with what stands beside it or not."""
-    return text == name or text.startswith(f"{name} ")
-
-
-def _of_times(tables: Mapping[str, Lines], label: str, times: Times) -> Iterator[str]:
+def _of_times(tables: Mapping[str, str], label: str, times: Times) -> Iterator[str]:
     """Yield run times that are others."""
-    for who, cells in _by_heads(next((found for title, found in tables.items() if title.endswith("-Runs")), [])):
+    for who, cells in _by_heads(_named(tables, "-Runs")):
         wall = next((wall for (one, run), (wall, _) in times.items() if one == label and run.rstrip(":") == who), 0.0)
         if "Run time [ms]" in cells and not _is_number(cells["Run time [ms]"].value, 1e3 * wall if wall else math.nan):
             yield f"the run time of {who}"
