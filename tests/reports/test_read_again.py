@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from pathlib import Path
@@ -13,7 +14,7 @@ from crossbody import cases
 from crossbody.cases.errors import OwnFault
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Verdict, Word
-from crossbody.reports.pages import read_again, results, site
+from crossbody.reports.pages import read_again, results, site, summary
 from crossbody.reports.runs import choice, jobs, output, study
 
 METRICS = ("position", "position (step)", "velocity", "energy_drift", "audit", "lam_impulse")
@@ -99,3 +100,18 @@ def test_a_row_or_a_cell_less_is_told(count: int, shown: Shown) -> None:
                     read_again.check(out, rows, times)
         finally:
             path.write_text(whole, encoding="utf-8")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_index_has_the_median_of_the_ratios_of_a_benchmark(seed: int, tmp_path: Path) -> None:
+    """Of the cases that were timed; the ratio of whole calls, or of the engine's own loop, is another one."""
+    rng, known, rows = np.random.default_rng(seed), dict[str, list[float]](), []
+    for case in ("a", "b", "c", "d"):
+        for engine in rng.choice(["one", "two", "three"], 2, replace=False):
+            ratio = None if rng.random() < 0.2 else float(10.0 ** rng.uniform(-2.0, 4.0))
+            more = {"ratio_call": rng.uniform(), "ratio_native": rng.uniform(), "least_ratio": rng.uniform()}
+            rows.append({"case": case, "engine": str(engine), "profile": "p", "ratio": ratio, **more})
+            known.setdefault(f"{engine}:p", []).extend([] if ratio is None else [ratio])
+    (tmp_path / "headline.json").write_text(json.dumps({"rows": rows, "provenance": {}}))
+    wanted = {who: float(np.median(ratios)) for who, ratios in known.items() if ratios}
+    assert summary._ratios(tmp_path) == pytest.approx(wanted)

@@ -162,6 +162,18 @@ def test_a_run_that_failed_is_one_sentence_and_one_entry(why: str, capsys: pytes
     assert "limit nan" not in said
 
 
+def test_the_time_of_the_command_is_told_by_its_parts(capsys: pytest.CaptureFixture[str]) -> None:
+    times = {
+        ("a:v", "one:p"): (9.0, 2.0),
+        ("b:v", "one:q"): (9.0, 3.0),
+        ("a:v", "two:p"): (9.0, 1.5),
+        ("a:v", "truth:"): (9.0, None),
+    }
+    run_shown.show_time([10.0, 21.0, 21.5, 24.5], times, compiling=1.25)
+    said = capsys.readouterr().out.replace("\n   ", "")
+    assert said.startswith("Time: 14.5 s: runs 11.0 (one 5.0, two 1.5, compiling 1.2, truths 3.2)")
+
+
 def test_a_number_that_is_none_is_not_written_as_one(capsys: pytest.CaptureFixture[str]) -> None:
     rows = [row("mujoco", "friction_power", math.nan, Word.OUTSIDE), row("mujoco", "x", math.nan, Word.OUTSIDE, 1e-6)]
     run_shown.show(rows, {})
