@@ -5,6 +5,7 @@
     |   +-- NoFile          a file that does not exist
     +-- InvalidValue        a value outside what its name admits
     +-- SceneError          a mechanism whose parts contradict each other (shapes, start, constants)
+    |   +-- KernelError     a kernel that is not what it says
     +-- ControlError        a controller of the user's own that raises, or gives something else than its controls
     +-- EngineUnavailable   an engine whose third-party package is not installed
     +-- CaseUnsupported     an engine that cannot do a case, in the engine's own words
@@ -14,7 +15,7 @@
     +-- OutputError         a folder that cannot be written, or that holds something of somebody else's
     +-- SchedulerUnavailable  a cluster that does not answer
 
-Numerical failure is never an exception: it is an `Outcome`.
+Numerical failure is never an exception: it is an `Outcome`. What crossbody finds wrong with itself is an `OwnFault`.
 """
 
 from __future__ import annotations
@@ -52,6 +53,10 @@ class CrossbodyError(Exception):
     def __reduce__(self) -> Any:
         """Return how another process makes it again: what a subclass takes is not its sentence."""
         return _again, (type(self), self.args, self.__dict__)
+
+
+class OwnFault(RuntimeError):  # noqa: N818
+    """A fault of crossbody's own that a check of its own has found: nobody has used it wrongly."""
 
 
 def _again(kind: type[CrossbodyError], told: tuple[Any, ...], state: dict[str, Any]) -> CrossbodyError:
@@ -121,6 +126,10 @@ class InvalidValue(CrossbodyError, ValueError):  # noqa: N818
 
 class SceneError(CrossbodyError, ValueError):
     """A mechanism or start whose parts contradict each other."""
+
+
+class KernelError(SceneError):
+    """A kernel that is not what it says, whatever the numbers of the scene: whoever wrote it made the mistake."""
 
 
 class ControlError(CrossbodyError, ValueError):

@@ -17,7 +17,7 @@ from crossbody.engines import settings as _settings
 from crossbody.engines._rolling import determined
 from crossbody.engines._scene import masses
 from crossbody.engines.contract import Engine, Run
-from crossbody.engines.equations import equations_of, known, module
+from crossbody.engines.equations import equations_of, has_equations, module
 from crossbody.reference import Options, System, prepare
 from crossbody.reference.options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
 from crossbody.reference.start import NOT_FOUND, OffRowsError
@@ -173,7 +173,7 @@ class Reference(Engine):
         solver = _settings.profile_of(self.name, self.profiles, profile)
         if (case.mechanism, solver) in UNSUITED:
             return UNSUITED[case.mechanism, solver]
-        if not known(case):
+        if not has_equations(case):
             return f"The reference has no equations of the mechanism {case.mechanism!r}."
         if case.collisions not in COLLISIONS:
             return (

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import SceneError
+from crossbody.cases.errors import KernelError
 from crossbody.reference._differences import AGREE, closest, differs
 from crossbody.reference._guarded import GuardedCall, entry
 from crossbody.reference._state import NOISE, State, started
@@ -121,7 +122,7 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
                 raise SceneError(f"Kernel {name} gives {where} = {value[~np.isfinite(value)][0]} at {at}.")
         if name == "rows" and np.any(found["H"][~inside] != 0.0):
             where = entry("H", (found["H"] != 0.0) & ~inside)
-            raise SceneError(f"Kernel rows gives {where} outside System.span, which is {np.asarray(s.span).tolist()}.")
+            raise KernelError(f"Kernel rows gives {where} outside System.span, which is {np.asarray(s.span).tolist()}.")
 
 
 def _near(first: State, v0: Floats, width: float, horizon: float, draw: Any) -> State:
@@ -144,7 +145,7 @@ def _check_coupled(at: State) -> None:
     apart = ~at.system.coupled() & (at.M != 0.0)
     if np.any(apart):
         where, value = entry("M", apart), at.M[apart][0]
-        raise SceneError(
+        raise KernelError(
             f"Kernel dynamics gives {where} = {value:.9g}, though by System.above neither "
             f"coordinate is above the other{at.where()}."
         )
@@ -252,7 +253,7 @@ def _check_rates(at: State, draw: Any) -> None:
         moved = there & differs(lambda x: at.gaps(x, at.v)[0], q, rest / size, np.zeros(s.nc), reach, reach)
         if np.any(moved):
             i = int(np.flatnonzero(moved)[0])
-            raise SceneError(
+            raise KernelError(
                 f"Kernel velocity gives q' = {rest.tolist()} at v = 0, along which gap {i} "
                 f"changes; gaps must stand still there, h' = H v{at.where()}."
             )
@@ -317,7 +318,7 @@ def _check_time(first: State, times: list[float]) -> None:
         moved = ~(np.abs(then - first.gap) <= bound)
         if np.any(moved):
             i = int(np.flatnonzero(moved)[0])
-            raise SceneError(
+            raise KernelError(
                 f"Kernel gaps gives h[{i}] = {first.gap[i]:.9g} at t = 0 and {then[i]:.9g} at "
                 f"t = {t:.9g} s at the same q; gaps must not depend on time. Make the wall a "
                 "coordinate of its own, which a force moves."
@@ -333,4 +334,4 @@ def _compare(at: State, kernel: str, name: str, given: Floats, other: str, wante
 
 
 def _refuse(at: State, kernel: str, what: str, given: float, other: str, wanted: float) -> None:
-    raise SceneError(f"Kernel {kernel} gives {what} = {given:.9g}, but {other} is {wanted:.9g}{at.where()}.")
+    raise KernelError(f"Kernel {kernel} gives {what} = {given:.9g}, but {other} is {wanted:.9g}{at.where()}.")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import SceneError
+from crossbody.cases.errors import KernelError
 from crossbody.reference.kinds import Floats
 
 GUARD = 64  # cells before and behind an array, beside as many as it has itself
@@ -40,7 +40,7 @@ class GuardedCall:
         """Call the kernel twice, with other values beyond its arrays and in what it must fill; return what it filled.
 
         Raises:
-            SceneError: naming kernel, array and entry, if it writes what it may only read, reads
+            KernelError: naming kernel, array and entry, if it writes what it may only read, reads
                 or writes beyond an array, or leaves an entry unfilled.
         """
         first, second = (self._call(dict.fromkeys(self.order, AROUND[i]), INSIDE[i]) for i in range(2))
@@ -48,10 +48,10 @@ class GuardedCall:
             a, b = first[name], second[name]
             unfilled = np.isnan(wanted) & (a == INSIDE[0]) & (b == INSIDE[1])
             if np.any(unfilled):
-                raise SceneError(f"Kernel {self.name} leaves {entry(name, unfilled)} unfilled; it fills every entry.")
+                raise KernelError(f"Kernel {self.name} leaves {entry(name, unfilled)} unfilled; it fills every entry.")
             differs = ~((a == b) | (np.isnan(a) & np.isnan(b)))
             if np.any(differs):
-                raise SceneError(self._origin(name, entry(name, differs)))
+                raise KernelError(self._origin(name, entry(name, differs)))
         return first
 
     def _call(self, around: Mapping[str, float], inside: float) -> dict[str, Floats]:
@@ -67,13 +67,13 @@ class GuardedCall:
         try:
             self.kernel(*arguments)
         except IndexError as error:
-            raise SceneError(f"Kernel {self.name} reads or writes beyond an array: {error}.") from None
+            raise KernelError(f"Kernel {self.name} reads or writes beyond an array: {error}.") from None
         for name, (line, array) in lines.items():
             expected, _ = _line(array, around[name])
             if line.tobytes() != expected.tobytes():
-                raise SceneError(f"Kernel {self.name} writes beyond {name}, whose shape is {array.shape}. {DEBUG}")
+                raise KernelError(f"Kernel {self.name} writes beyond {name}, whose shape is {array.shape}. {DEBUG}")
             if name in self.inputs and array.tobytes() != self.inputs[name].tobytes():
-                raise SceneError(f"Kernel {self.name} writes {name}, which is read-only.")
+                raise KernelError(f"Kernel {self.name} writes {name}, which is read-only.")
         return {name: lines[name][1] for name in self.outputs}
 
     def _origin(self, name: str, where: str) -> str:

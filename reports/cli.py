@@ -112,8 +112,10 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
 
     given = choice.parse_settings(asked["pairs"])
     output.check(asked["out"], "run")
-    cases = choice.load_cases(asked["names"], asked.pop("variant"), given, asked["limit"])
-    return _do("run.run", cases, **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
+    names, variant = asked["names"], asked.pop("variant")
+    cases = choice.load_cases(names, variant, given, asked["limit"])
+    sources = choice.sources(names, variant)
+    return _do("run.run", cases, sources, **asked, at_once=jobs or os.cpu_count() or 1, command=options.command())
 
 
 @cli.command()

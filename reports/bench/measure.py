@@ -12,6 +12,7 @@ import gc
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,6 +21,7 @@ import pandas as pd
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, Trajectory
+from crossbody.engines.equations import answering
 from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
@@ -77,10 +79,8 @@ def _rungs(
         tell(label)
         watch.limited(label, limit)
         if not pick.skipped and not watch.lost(label):
-            try:
+            with suppress(CaseUnsupported), answering(case):
                 yield from _climbed(case, pick, effort, truths)
-            except CaseUnsupported:
-                continue
 
 
 def _climbed(case: Case, pick: Pick, effort: Effort, truths: Truths) -> Iterator[Rung]:

@@ -63,10 +63,10 @@ def _each(pool: Executor, tasks: Sequence[Task], tell: Callable[[str], None]) ->
 
 def compile_kernels(name: str) -> None:
     """Compile the kernels of a case, in all its variants."""
-    from crossbody.engines.equations import known, system_of  # numba, which the other commands do without
+    from crossbody.engines.equations import has_equations, system_of  # numba, which the other commands do without
 
     for variant in cases.variants(name):
-        if known(case := cases.load(name, variant)):
+        if has_equations(case := cases.load(name, variant)):
             system_of(case)
 
 

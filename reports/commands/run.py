@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,17 +9,18 @@ from time import perf_counter
 
 import click
 
-from crossbody.cases import Case, installed
-from crossbody.cases.loading import OF_USERS, parted
+from crossbody.cases import Case, InvalidValue
+from crossbody.cases.errors import OwnFault
+from crossbody.engines.equations import answering, equations_of, has_equations
 from crossbody.reference.compiling import count
 from crossbody.reports import voice
-from crossbody.reports.commands import planned
+from crossbody.reports.commands import planned, repeated
 from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging import known
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.reach import BUDGET
-from crossbody.reports.judging.verdict import Row, exit_code
+from crossbody.reports.judging.verdict import Row, Word, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results
 from crossbody.reports.runs import files, jobs, output, store, study, watch
@@ -31,18 +31,18 @@ from crossbody.reports.voice import progress
 
 
 def run(
-    cases: Sequence[Case], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str],
+    cases: Sequence[Case], sources: Sequence[str], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str],
     out: Path, rtol: float | None, settings: Sequence[str], command: str,
     against: Path | None = None, others: Sequence[Path] = (), limit: float = LIMIT,
     strict: bool = False, at_once: int = 1, budget: float = BUDGET,
 ) -> int:  # fmt: skip
     """Run, judge, write and show; the exit code.
 
-    `cases` are those of `names`, with the parameters of `pairs`; `against` is the folder of an
-    earlier run, which may be `out` itself; `others` those of studies beside this one; `limit` is
-    the time that an engine may take for one case, s; `strict` makes a number wrong that left its
-    regression band; `at_once` is how many cases are run at once, in processes of their own;
-    `budget` is how long the tightest run of a scene may take, s.
+    `cases` are those of `names`, with the parameters of `pairs`, `sources` the name or file of
+    each; `against` is the folder of an earlier run, which may be `out` itself; `others` those of
+    studies beside this one; `limit` is the time that an engine may take for one case, s; `strict`
+    makes a number wrong that left its regression band; `at_once` is how many cases are run at
+    once, in processes of their own; `budget` is how long the tightest run of a scene may take, s.
     """
     picks, asked = planned.checked(wanted, rtol, settings, out, against, others)
     planned.check_settings(cases, picks, asked, rtol)
@@ -55,10 +55,12 @@ def run(
     with Parts(out, command, decides) as parts:
 
         def do(i: int, tell: Callable[[str], None] = lambda _: None) -> int:
-            result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit, budget=budget)
-            again = pairs if result.case.t_end == cases[i].t_end else (*pairs, f"t_end={result.case.t_end:g}")
+            with answering(cases[i]):
+                result = jobs.run_case(cases[i], picks, rtol, tell, asked, limit=limit, budget=budget)
             with parts.put(key(i, cases[i])) as made:
-                rows = study.write_case(made, result, repeat(cases[i], names, again, rtol, settings))
+                again = repeated.repeat(cases[i], sources[i], pairs, rtol, budget, result.case.t_end)
+                rows = study.write_case(made, result, again)
+                repeated.check(rows, cases[i], result, rtol, asked, budget)
             if len(cases) > 1:
                 voice.note(f"{cases[i].label}: {counted(rows)}")
             return 0
@@ -71,21 +73,39 @@ def run(
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
             # Pages take longer than all but the engines: what they show is printed before them, and lost by nothing.
-            untold = _tell(rows, made, controlled=any(case.control is not None for case in cases))
+            times = results.times_of(made)
+            untold = _tell(rows, times, made, controlled=any(case.control is not None for case in cases))
             clock.append(perf_counter())
-            from crossbody.reports.pages import site  # after the verdicts: templates take longer to import than to fill
+            from crossbody.reports.pages import (
+                read_again,
+                site,
+            )  # after the verdicts: templates take longer to import than to fill
 
             site.write(made, against=against, others=others)
+    read_again.check(out, rows, times)
     if untold is not None:
         raise untold
     if not voice.silent():
-        show_time([*clock, perf_counter()], results.times_of(out), count.seconds - compiled)
+        show_time([*clock, perf_counter()], times, count.seconds - compiled)
     where(out)
+    _check_any(rows)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
 
 
-def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | None:
+def _check_any(rows: Sequence[Row]) -> None:
+    """Check that some engine has run: where none has, nothing is within.
+
+    Raises:
+        InvalidValue: with why.
+    """
+    own = [row for row in rows if row["engine"] != TRUTH]
+    if all(row["verdict"] == Word.SKIPPED for row in own) and exit_code(row["verdict"] for row in rows) == 0:
+        why = " ".join(dict.fromkeys(row["why"] for row in own))
+        raise InvalidValue(f"None of the selected engines can run any of the selected cases. {why}".strip())
+
+
+def _tell(rows: Sequence[Row], times: results.Times, made: Path, controlled: bool) -> OSError | OwnFault | None:
     """Print the verdicts of a folder; what keeps them from being printed."""
     try:
         if voice.as_json():
@@ -93,8 +113,8 @@ def _tell(rows: Sequence[Row], made: Path, controlled: bool) -> OSError | None:
             return None
         if controlled and not voice.quiet():
             show_controllers(made)
-        show(rows, results.times_of(made))
-    except OSError as error:
+        show(rows, times)
+    except (OSError, OwnFault) as error:
         return error
     return None
 
@@ -126,25 +146,9 @@ def findings(case: Case) -> tuple[str, ...]:
     """Return sentences on what is strange in a case, and in the equations of a scene with loops."""
     if case.scene is None or not case.scene.loops:
         return case.findings
-    from crossbody.engines.equations import equations_of, known
-
-    if not known(case):
+    if not has_equations(case):
         return case.findings
     return (*case.findings, *equations_of(case).findings)
-
-
-def repeat(
-    case: Case, names: Sequence[str], pairs: Sequence[str], rtol: float | None, settings: Sequence[str] = ()
-) -> str:
-    """The command that reproduces the rows of one case, but for its engine."""
-    files = (name for name, _ in map(parted, names) if name.endswith(OF_USERS))
-    own = (name for name in files if case.name in (Path(name).stem, Path(name).name))
-    source = next(own, case.name)
-    words = ["crossbody", "run", source, "--variant", case.variant]
-    words += [word for pair in pairs for word in ("--set", pair)]
-    words += [word for pair in settings for word in ("--set-engine", pair)]
-    words += ["--rtol", f"{rtol:g}"] if rtol is not None else []
-    return shlex.join(words + installed.options())
 
 
 def show_controllers(out: Path) -> None:

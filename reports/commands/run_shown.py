@@ -10,6 +10,7 @@ from itertools import pairwise
 import click
 
 from crossbody.reports import layout, voice
+from crossbody.reports.commands import printed
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, beyond, runs_of, sentence
 from crossbody.reports.judging.verdict import Regression, Row, Word
@@ -41,20 +42,20 @@ def counted(rows: Sequence[Row]) -> str:
 
 
 def show(rows: Sequence[Row], times: Times) -> None:
-    """Print who is off and by how much, a line a run, every row that is wrong, and what could not run."""
+    """Print who is off and by how much, a line a run, every row that is wrong, and what could not run.
+
+    Raises:
+        OwnFault: if that is not what the rows say; it is printed all the same.
+    """
     runs = runs_of(rows)
-    if not voice.quiet():
-        shown = table(runs, times, layout.columns())
-        click.echo(f"{layout.told(sentence(runs))}\n\n{shown}\n\n{layout.told(counted(rows))}")
-    for run in runs:
-        for text in wrong(run):
-            click.echo(layout.told(text))
-    for run in runs:
-        for row in (row for row in run.rows if row["regression"] == Regression.LOST):
-            click.echo(layout.told(_lost(run, row)))
-    if not voice.quiet():
-        for text in _absent(runs):
-            click.echo(layout.told(text))
+    above = [layout.told(sentence(runs)), table(runs, times, layout.columns()), layout.told(counted(rows))]
+    lines = [text for run in runs for text in wrong(run)]
+    lines += [_lost(run, row) for run in runs for row in run.rows if row["regression"] == Regression.LOST]
+    texts = [*above, *map(layout.told, [*lines, *([] if voice.quiet() else _absent(runs))])]
+    for i, text in enumerate(texts):
+        if i >= len(above) or not voice.quiet():
+            click.echo(text + "\n" * (i < len(above) - 1))
+    printed.check(texts, rows, times, layout.columns())
 
 
 def show_time(clock: Sequence[float], times: Times, compiling: float = 0.0) -> None:

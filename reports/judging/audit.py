@@ -63,7 +63,7 @@ def _flat(value: Any) -> Floats:
 def _words(value: Any) -> str:
     if isinstance(value, Mapping):
         return ", ".join(f"{k} {_words(v)}" for k, v in sorted(value.items()))
-    return " ".join(f"{x:.6g}" for x in _flat(value))
+    return " ".join(f"{x + 0.0:.6g}" for x in _flat(value))  # no -0
 
 
 def difference(mine: Any, theirs: Any, least: float = 0.0) -> float:

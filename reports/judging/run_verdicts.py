@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from crossbody import cases, engines
-from crossbody.cases import Case, CaseUnsupported, Claim, CrossbodyError, Limit, Trajectory
+from crossbody.cases import Case, CaseUnsupported, Claim, CrossbodyError, Limit, Trajectory, Value
 from crossbody.cases.arguments import instance
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
@@ -82,6 +83,7 @@ class Entry:
         own: truth of the equations that the engine really integrates; None where they are the case's own.
         hidden: what this engine does not show, and why (`crossbody.engines.hidden`).
         crashed: what it threw, where it did not come back with an outcome.
+        asked: of the settings, those that were asked for.
         took_s: what all of that took, s: preparation and the runs that tell the parts of its error too,
             compilation aside.
     """
@@ -98,7 +100,14 @@ class Entry:
     own: Truth | None = None
     hidden: Mapping[str, str] = field(default_factory=dict)
     crashed: str = ""
+    asked: Mapping[str, Value] = field(default_factory=dict)
     took_s: float = 0.0
+
+    @property
+    def options(self) -> str:
+        """What a command says to run it."""
+        words = [word for name, value in self.asked.items() for word in ("--set-engine", f"{name}={value}")]
+        return shlex.join([*words, "--engine", f"{self.engine}:{self.profile}"])
 
 
 def unguarded(_label: str) -> str:
@@ -142,7 +151,7 @@ class Judge:
         self.limits = limits_of(case)
         self.stored: Deviations = deviations(case, entry, truth.trusted)
         self.looser, self.longer = looser(case, entry), longer(case)
-        self.command = f"{command} --engine {entry.engine}:{entry.profile}"
+        self.command = f"{command} {entry.options}"
 
     def limit(self, metric: str) -> Limit | None:
         """The limit that judges this run: wider as errors grow and tolerances do, while a fault of a per cent shows.
@@ -400,7 +409,7 @@ def _row(
         beyond = found.verdict != Word.WITHIN and math.isfinite(value) and value > found.limit
         return replace(found, where=place(truth, run, judge_.case)) if place and beyond else found
     if name in judge_.claims:
-        return judge_.missing(name, metric.UNIT, "There is no such number.", needs)
+        return judge_.missing(name, metric.UNIT, "The run does not tell it.", needs)
     if wanted and metric.measure(truth, truth.trajectory, judge_.case) is not None:
         return judge_.missing(name, metric.UNIT, "The run lacks this number, which the truth has.", needs)
     return None

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from crossbody.reports.judging.parts import PARTS, SPLIT, part_of
 from crossbody.reports.judging.verdict import IDENTITIES, Row, Word
+from crossbody.reports.layout import valid
 from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
@@ -98,6 +99,8 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     """Say how many runs are within all limits, which have known deviations, and which are off and why."""
     all_ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
     ran = [run for run in all_ran if run.judged]
+    if not all_ran and not any(run.wrong for run in runs):
+        return "Nothing is judged, since no engine has run."
     if all_ran and not ran and not any(run.wrong for run in runs):  # a truth may be outside by itself
         return "Nothing is judged, since no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
@@ -155,6 +158,8 @@ def _off(run: EngineRun, row: Row) -> str:
         return f"{run.who} on {run.label} (did not finish)"
     times = share(row)
     size = f"{row['value']:.2g}, {times:.2g} times its limit" if math.isfinite(times) else row["verdict"]
+    if row.get("unit") == "%" and math.isfinite(times):  # a share of the whole is no multiple of what it may lack
+        size = f"{row['value']:.3g} %, where {valid(row['expected'], row['limit'])} % is valid"
     size += f": {row['where']}" if row.get("where") else ""
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
 

@@ -58,7 +58,7 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
         CrossbodyError: if the reference cannot run the case.
     """
     from crossbody import engines
-    from crossbody.engines.equations import known as has_equations
+    from crossbody.engines.equations import has_equations
 
     arguments.instance("case", case, Case, "a case")
     if case.closed_form is None:

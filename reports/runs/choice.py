@@ -8,6 +8,7 @@ from typing import Any
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, InvalidValue, UnknownName, Value
+from crossbody.cases.loading import parted
 from crossbody.reports.runs import watch
 
 DEFAULT_CASES = ("bouncing_ball",)
@@ -69,10 +70,18 @@ def load_cases(
         if why := watch.lost(label):
             raise CaseUnsupported(f"{name} cannot be built. {why}")
         watch.limited(label, limit)
-        chosen = (variant,) if variant is not None else cases.variants(name)
-        found += [cases.load(name, each, **overrides) for each in chosen]
+        found += [cases.load(name, each, **overrides) for each in _variants(name, variant)]
     watch.unlimited()
     return tuple(found)
+
+
+def sources(names: Sequence[str], variant: str | None) -> tuple[str, ...]:
+    """Return what each of the cases that `load_cases` returns is loaded by: a name or a file."""
+    return tuple(parted(name)[0] for name in names or DEFAULT_CASES for _ in _variants(name, variant))
+
+
+def _variants(name: str, variant: str | None) -> tuple[str, ...]:
+    return (variant,) if variant is not None else cases.variants(name)
 
 
 def picks(wanted: Sequence[str]) -> tuple[Pick, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter, process_time
 from typing import Any, TypeVar
@@ -13,6 +14,7 @@ import numpy as np
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, CrossbodyError, InvalidValue, Outcome, SceneError, Trajectory, Value
 from crossbody.cases.arguments import instance
+from crossbody.cases.errors import OwnFault
 from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
@@ -102,6 +104,7 @@ def run_case(
     label = f"{case.label}: truth"
     tell(label)
     watch.limited(label, TRUTHS * limit)
+    started = _clock()
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} is not available. {why}")
     if truth is None and case.general and case.closed_form is None:
@@ -122,10 +125,22 @@ def run_case(
         why = watch.lost(label)
         began = _clock()
         entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine, budget)
-        entries.append(replace(entry, took_s=_clock() - began))
+        own = _own(case, pick, entry, settings or {})
+        entries.append(replace(entry, took_s=_clock() - began, asked=own))
     watch.unlimited()
+    if not (whole := sum(one.took_s for one in entries)) <= (passed := _clock() - started):
+        raise OwnFault(f"Runs of {case.label} are said to have taken {whole:.3g} s of {passed:.3g} s.")
     check_known(settings or {}, [(one.engine, one.profile, one.settings) for one in entries if one.run is not None])
     return CaseResult(case=case, truth=truth, entries=tuple(entries))
+
+
+def _own(case: Case, pick: Pick, entry: Entry, settings: Mapping[str, Value]) -> dict[str, Value]:
+    """Return those of the settings that an engine was asked to take and has."""
+    mine, known = of_pick(settings, pick), entry.settings
+    if mine and not (known or pick.skipped):  # it did not get so far as to say which it used
+        with suppress(CaseUnsupported):
+            known = engines.load(pick.engine).offered(case, pick.profile)
+    return {name: value for name, value in mine.items() if name in known}
 
 
 def _clock() -> float:

@@ -102,7 +102,7 @@ def assemble(out: Path, parts: Sequence[Path], provenance: Mapping[str, Any]) ->
     for i, trace in enumerate(traces):
         name = f"{trace.parent.name}/{trace.name}"
         (out / "traces" / f"{i:04d}.parquet").write_bytes(files.read_inside(trace.parent.parent, name))
-    read_back.check_tables(out, parts, rows)
+    read_back.check_tables(out, parts, rows, provenance)
     return rows
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import textwrap
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -17,8 +18,9 @@ from places import helped
 
 from crossbody import cases
 from crossbody.cases import SceneError
+from crossbody.cases.errors import OwnFault
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape, Tendon
-from crossbody.engines.equations import system_of
+from crossbody.engines.equations import answering, system_of
 from crossbody.reference import Options, System, _check, kernels, prepare, simulate
 from crossbody.reference._check import check_kernels
 from crossbody.reference._differences import differs
@@ -204,6 +206,24 @@ def test_a_kink_is_no_fault(at):
         check_kernels(system, np.array([at]), np.zeros(1), seed=seed)
 
 
+def test_only_kernels_that_somebody_else_wrote_are_his_fault():
+    """One of crossbody's own that is not what it says is a fault of crossbody."""
+    case = cases.load("bouncing_ball")
+    system = replace(system_of(case), gaps=kernels.gaps(_gaps.py_func))
+    with pytest.raises(OwnFault, match="Kernel"), answering(case):
+        simulate(system, np.array(case.q0), np.array(case.v0), 1.0)
+    with pytest.raises(SceneError, match="Kernel"), answering(replace(case, mechanism="mine.py")):
+        simulate(system, np.array(case.q0), np.array(case.v0), 1.0)
+
+
+@pytest.mark.parametrize("mass", [-1.0, 1e308])
+def test_a_number_that_no_mechanism_has_is_no_fault_of_a_kernel(mass):
+    system = system_of(cases.load("bouncing_ball"))
+    changed = replace(system, parameters={**system.parameters, "mass": mass})
+    with pytest.raises(SceneError, match="Kernel dynamics gives"), answering(cases.load("bouncing_ball")):
+        simulate(changed, np.ones(1), np.zeros(1), 1.0)
+
+
 def test_a_run_checks_its_system_once(monkeypatch):
     system = _bead(rows=_faulty("rows", "Hdv[0] = 0.0", _rows))
     with pytest.raises(SceneError, match=r"Kernel rows gives Hdv\[0\]"):
@@ -242,7 +262,7 @@ SHIPPED = """
     import numpy as np
     from mechanisms import sliders
     from crossbody import cases
-    from crossbody.engines.equations import system_of
+    from crossbody.engines.equations import answering, system_of
     from crossbody.reference import System, kernels
 
     count = 0
@@ -282,7 +302,7 @@ def test_every_shipped_kernel_stays_inside_its_arrays(tmp_path):
     assert done.returncode == 0, done.stderr
     count, found = done.stdout.splitlines()
     assert int(count) == len(VARIANTS)
-    assert found.startswith("SceneError Kernel energy reads or writes beyond an array: index")
+    assert found.startswith("KernelError Kernel energy reads or writes beyond an array: index")
 
 
 def test_with_debugging_on_kernels_check_their_indices(tmp_path):
@@ -292,7 +312,7 @@ def test_with_debugging_on_kernels_check_their_indices(tmp_path):
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("SceneError Kernel energy reads or writes beyond an array: index")
+    assert done.stdout.startswith("KernelError Kernel energy reads or writes beyond an array: index")
 
 
 @pytest.mark.parametrize("bend", 10.0 ** np.arange(-5, 1))

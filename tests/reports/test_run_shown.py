@@ -117,6 +117,11 @@ def test_a_number_without_parts_is_blamed_on_what_is_wrong_in_the_motion(metric:
     assert f"b:matched on ball:v ({metric} 0.0005, 5e+02 times its limit{said})." in sentence(runs_of(rows))
 
 
+def test_a_share_of_the_whole_is_no_multiple_of_its_limit() -> None:
+    fit = row("a", "fit th1", -4.5e4, Word.OUTSIDE, 10.0) | {"unit": "%", "expected": 100.0}
+    assert "(fit th1 -4.5e+04 %, where at least 90 % is valid)." in sentence(runs_of([fit]))
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_what_has_no_number_is_off_the_farthest(value: float) -> None:
     rows = [row("a", "position", 1.0, Word.OUTSIDE, 1e-9), row("b", "lam_impulse", value, Word.OUTSIDE, 1.0)]
@@ -155,6 +160,18 @@ def test_a_run_that_failed_is_one_sentence_and_one_entry(why: str, capsys: pytes
     assert "Off: mujoco:matched on ball:v (did not finish)." in folded
     assert "nan W" not in said
     assert "limit nan" not in said
+
+
+def test_the_time_of_the_command_is_told_by_its_parts(capsys: pytest.CaptureFixture[str]) -> None:
+    times = {
+        ("a:v", "one:p"): (9.0, 2.0),
+        ("b:v", "one:q"): (9.0, 3.0),
+        ("a:v", "two:p"): (9.0, 1.5),
+        ("a:v", "truth:"): (9.0, None),
+    }
+    run_shown.show_time([10.0, 21.0, 21.5, 24.5], times, compiling=1.25)
+    said = capsys.readouterr().out.replace("\n   ", "")
+    assert said.startswith("Time: 14.5 s: runs 11.0 (one 5.0, two 1.5, compiling 1.2, truths 3.2)")
 
 
 def test_a_number_that_is_none_is_not_written_as_one(capsys: pytest.CaptureFixture[str]) -> None:
