@@ -17,6 +17,8 @@ from crossbody.reference.core.friction import is_shared
 from crossbody.reference.core.journal import blame
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
 from crossbody.reference.core.loops import bears_nothing
+from crossbody.reference.core.machine import ROUNDING
+from crossbody.reference.core.unknowns import row_size
 from crossbody.reference.kinds import Bytes
 
 CLOSE = 1e-9  # part of the terms behind a row's multiplier: rounding stays far below, and asks no further
@@ -40,6 +42,15 @@ def _residual(s: Any, m: Model, w: Work, mode: Bytes, j: int, stage: int) -> tup
     h = w.ha[j]
     total += a1 * w.hda[j] + (a0 + a2 * h * h) * h
     return abs(total), ULP * (a0 * position + a1 * speed)
+
+
+@compiled
+def _heaviest(s: Any, m: Model, w: Work) -> float:
+    """The largest multiplier, by the sizes of rows: elimination rounds all of them by a part of it, however small."""
+    most = 0.0
+    for j in range(s.na):
+        most = max(most, abs(w.la[j]) * row_size(m, w, j))
+    return most
 
 
 @compiled
@@ -67,6 +78,8 @@ def follows_law(K: Any, s: Any, m: Model, w: Work, b: Buffers, stage: int) -> bo
         if missing <= CLOSE * w.scale[j] + rounding + open_by:
             continue
         weigh(s, m, w, w.la)
+        if s.frictional and missing <= ROUNDING * _heaviest(s, m, w) * row_size(m, w, j):
+            continue
         if not missing <= WRONG * (w.scale[j] + pushed(m, w, j)) + 64.0 * rounding:
             blame(b, w.idx[j])
             return False
