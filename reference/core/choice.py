@@ -11,7 +11,7 @@ from crossbody.reference.core import dop853
 from crossbody.reference.core.acceleration import push_rows
 from crossbody.reference.core.algebra import ULP, solve_schur
 from crossbody.reference.core.dop853_table import E3, STABILITY_LIMIT, STAGES
-from crossbody.reference.core.friction import BEGUN, TURNING_RATE, ask
+from crossbody.reference.core.friction import BEGUN, NOTHING, TURNING_RATE, ask
 from crossbody.reference.core.layout import EXPLICIT, IMPLICIT, Model, Work
 
 SAFETY = 0.9
@@ -64,6 +64,8 @@ def longest_step(s: Any, m: Model, w: Work) -> float:
     if s.frictional:
         s.slip_rate = ask(TURNING_RATE, s, m, w, BEGUN)
         rate = max(s.row_rate, s.slip_rate)
+        if s.blurred:  # slips of rounding's size beside fast bodies: none but their own law tells how stiff they are
+            s.slip_rate = max(s.slip_rate, ask(TURNING_RATE, s, m, w, NOTHING))
     return float(min(s.h_max, STABILITY_LIMIT / rate) if rate > 0.0 else s.h_max)
 
 

@@ -120,6 +120,7 @@ STATE = np.dtype(
         ("explicit_rate", "f8"),
         ("row_rate", "f8"),  # fastest pole of the active rows, at an explicit step's start
         ("slip_rate", "f8"),  # fastest at which friction turns slips that have begun, or that its stages show
+        ("blurred", "i8"),  # the last step was so short that its stages show no rate
         ("have_jacobian", "i8"),
         ("full_jacobian", "i8"),
         ("jacobian_scale", "f8"),

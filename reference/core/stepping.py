@@ -77,7 +77,8 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     if not known and dop853.derivative(K, s, m, w, t, w.y1, end) != 0:
         return ILL_POSED
     if s.frictional and s.method == EXPLICIT:
-        s.slip_rate = max(s.slip_rate, choice.stage_rate(s, w))
+        shown = choice.stage_rate(s, w)
+        s.slip_rate, s.blurred = max(s.slip_rate, shown), shown == 0.0
     s.parting = s.contradiction > 1.0
     scatter(s, w, w.lams[last])
     if s.nc > 0:
