@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from crossbody.cases import Case, Value, installed
@@ -76,7 +77,8 @@ def _read(command: str) -> Mapping[str, Any]:
 def _of_case(given: Mapping[str, Any], case: Case, t_end: float) -> Iterator[str]:
     """Yield what differs of a case that was followed to t_end, s."""
     (source,), variant, defined = given["names"], given["variant"], module(given["names"][0])
-    if (source, variant) != (case.file or source, case.variant) or variant not in defined.VARIANTS:
+    elsewhere = case.file and Path(source).absolute() != Path(case.file).absolute()
+    if elsewhere or variant != case.variant or variant not in defined.VARIANTS:
         yield "case"
         return
     pairs = parse_settings(given["pairs"])

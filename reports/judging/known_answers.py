@@ -292,6 +292,10 @@ def _modes(made: MadeUp) -> Answers:
         for row in np.flatnonzero(opens).tolist():
             bears, high = abs(run.lam[i, row]) > light, run.gap[i, row] > ways[row]
             other += bool(bears if run.mode[i, row] == Mode.FREE else high and not bears)
+    for e in run.events:  # and touches of rows that are above by two of these ways at the samples around
+        behind = next((i for i in range(1, len(run.t)) if run.t[i] > e.t), len(run.t) - 1)
+        least = min(run.gap[max(behind - 2, 0) : behind + 1, e.contact].tolist())
+        other += bool(opens[e.contact] and _begins(e) and e.before == Mode.FREE and least > 2.0 * ways[e.contact])
     return {"mode_residual": float(odd), "mode_contradicted": float(other)}
 
 

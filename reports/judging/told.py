@@ -100,7 +100,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     all_ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
     ran = [run for run in all_ran if run.judged]
     if not all_ran and not any(run.wrong for run in runs):
-        return "Nothing is judged, since no engine has run."
+        return f"Nothing is judged, since no engine has run.{_known_until(runs)}"
     if all_ran and not ran and not any(run.wrong for run in runs):  # a truth may be outside by itself
         return "Nothing is judged, since no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
@@ -119,13 +119,17 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     if loose:
         loose.sort(key=lambda one: -share(one[1]))
         text += f" Beyond a limit for a known cause, and not judged: {_named([_off(*one) for one in loose])}."
+    return f"{text}{_known_until(runs)}"
+
+
+def _known_until(runs: Sequence[EngineRun]) -> str:
+    """Say which cases are compared in part only, since the truth is known no further; nothing if none is."""
     short = [(run.label, row) for run in runs for row in run.rows if row["metric"] == TRUTH and row["compared"] < 1.0]
-    if short:
-        text += (
-            " Compared up to the time to which the truth is known: "
-            f"{_named([f'{at}, {_part(row)}' for at, row in short])}."
-        )
-    return text
+    if not short:
+        return ""
+    return (
+        f" Compared up to the time to which the truth is known: {_named([f'{at}, {_part(row)}' for at, row in short])}."
+    )
 
 
 def _counted(within: int, ran: int, known: Sequence[str]) -> str:
