@@ -326,8 +326,8 @@ def _laws(plain: Plain, least: float) -> Iterator[Control]:
         return
     if not _acts(plain.case, few, int(at[0]), int(at[1])):
         return
-    # Friction of what slides is the run's own: changed, it asks for other normal forces, near a jam for far larger ones.
-    # And of rows that depend on others a part counts.
+    # Friction of what slides is the run's own: changed, it asks for other normal forces, near a jam for far larger
+    # ones. And of rows that depend on others a part counts.
     twice = LARGE if plain.case.rubs else roughly(1.0) if plain.case.general else exactly(1.0)
     for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
         other = replace(few, lam=times * few.lam)
