@@ -26,6 +26,7 @@ from crossbody.cases import CrossbodyError, InvalidValue, Outcome, SceneError, U
 from crossbody.cases.files.mjcf import scene_of
 from crossbody.cases.files.reading import model_of
 from crossbody.cases.files.reading import scene_of as scene_of_file
+from crossbody.cases.rotations import matrices
 from crossbody.cases.scene import Actuator
 from crossbody.reference import System, simulate
 from crossbody.reference.tree import mechanism
@@ -1038,3 +1039,28 @@ def test_a_parameter_of_a_file_is_told_with_the_files_name(tmp_path: Path) -> No
         cases.load(name, "raised", t_end=-1.0)
     with pytest.raises(UnknownName, match=r"variant .* of arm\.xml"):
         cases.load(name, "none")
+
+
+HUNG = """<robot name="hung"><link name="world"/>
+  <link name="mount"/><link name="drone"><inertial><mass value="1.3"/><origin xyz=".01 .02 .03"/>
+    <inertia ixx=".01" iyy=".02" izz=".025" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="fixed" type="fixed"><parent link="world"/><child link="mount"/><origin xyz="{a}" rpy="{b}"/></joint>
+  <joint name="free" type="floating"><parent link="mount"/><child link="drone"/><origin xyz="{c}" rpy="{d}"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_body_that_floats_on_a_fixed_mount_begins_where_its_file_says(seed: int, tmp_path: Path) -> None:
+    """Pinocchio reads the file by itself."""
+    pin = pytest.importorskip("pinocchio")
+    rng = np.random.default_rng(seed)
+    path = tmp_path / "hung.urdf"
+    numbers = {name: " ".join(f"{x:.6f}" for x in rng.normal(size=3)) for name in "abcd"}
+    path.write_text(HUNG.format(**numbers))
+    model = pin.buildModelFromUrdf(str(path))
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    place = data.oMi[model.getJointId("free")]
+    q0 = np.array(cases.from_file(str(path)).q0)
+    np.testing.assert_allclose(q0[:3], place.translation, atol=1e-9)
+    np.testing.assert_allclose(matrices(q0[3:7]), place.rotation, atol=1e-9)
