@@ -7,7 +7,6 @@ of the sources then say the same, and beside the code is kept what they were com
 
 from __future__ import annotations
 
-import hashlib
 import os
 import sys
 from typing import Any
@@ -53,4 +52,4 @@ def note(module: str, signature: Any, key: str) -> None:
 def _name(module: str, signature: Any) -> str:
     """Return under which name it is kept: readable, then a digest of all that the code depends on."""
     depends = (module, str(signature), *map(digest, FOLDERS), np.__version__, str(debugging()), *machine())
-    return f"sources_of_{module}-{hashlib.sha256(chr(0).join(depends).encode()).hexdigest()[:32]}"
+    return code_store.named(f"sources_of_{module}", *depends)

@@ -7,7 +7,6 @@ be compiled again. What has no digest is compiled in every process.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import pickle
 import platform
@@ -228,13 +227,12 @@ class _Overloads:
         self.cache_path = ""
 
     def key(self, content: str, sig: Any) -> str:
-        """Return the name of a file: readable, then a digest of all that the code depends on."""
+        """Return the name of the file of code for a signature."""
         function, options = self._dispatcher.py_func, sorted(self._dispatcher.targetoptions.items())
         args, _ = sigutils.normalize_signature(sig)
         homes = " ".join(type(kind).__module__ for kind in args)  # by which what is kept finds its types again
         what = (str(function.__module__), function.__qualname__, content, str(sig), homes, repr(options), *machine())
-        digest = hashlib.sha256("\0".join(what).encode("utf-8", "surrogatepass")).hexdigest()[:32]
-        return f"{re.sub(r'[^A-Za-z0-9_.-]', '', function.__name__)[:40]}-{digest}"
+        return code_store.named(re.sub(r"[^A-Za-z0-9_.-]", "", function.__name__)[:40], *what)
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Return what was kept for a signature; None if nothing was, or if it cannot be used."""

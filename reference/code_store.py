@@ -71,6 +71,12 @@ def current() -> Store | None:
     return None if where is None else _opened(where)
 
 
+def named(readable: str, *depends: str) -> str:
+    """Return the name of a file: readable, then a digest of all that its content depends on."""
+    digest = hashlib.sha256("\0".join(depends).encode("utf-8", "surrogatepass")).hexdigest()
+    return f"{readable}-{digest[:32]}"
+
+
 @cache
 def _opened(where: Path) -> Store | None:
     try:

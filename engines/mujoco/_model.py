@@ -160,6 +160,8 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
 
 def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
     """Return d(v, v')/d(q, v) (2 nv, 2 nv) by springs, dampers and actuators alone, with the loops closed."""
+    from scipy.linalg import null_space  # as above
+
     model = matched(scene)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = q, v
@@ -178,17 +180,9 @@ def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
     K = np.array([(forces(d, still) - forces(-d, still)) / (2.0 * step) for d in lift]).T
     D = np.array([(forces(still, d) - forces(still, -d)) / (2.0 * step) for d in lift]).T
     root = np.linalg.inv(np.linalg.cholesky(M))
-    free = _null_space(H @ root.T) if len(H) else np.eye(n)
+    free = null_space(H @ root.T, rcond=DEPENDENT) if len(H) else np.eye(n)
     mobility = root.T @ free @ free.T @ root
     return np.block([[np.zeros((n, n)), np.eye(n)], [mobility @ K, mobility @ D]])
-
-
-def _null_space(rows: Floats) -> Floats:
-    """Return an orthonormal basis of what rows map to nothing."""
-    from scipy.linalg import null_space
-
-    found: Floats = null_space(rows, rcond=DEPENDENT)
-    return found
 
 
 def build(

@@ -128,18 +128,10 @@ def _planned(
     """Return each engine and profile with its settings, or with why it would not run."""
     given = dict(asked) | ({} if rtol is None else {"rtol": rtol})
     own = [choice.of_case(pick, case) for pick in picks]
-    offers = [(pick, _offered(case, pick)) for pick in own if asked and not pick.skipped]
+    offers = [(pick, choice.offered(case, pick)) for pick in own if asked and not pick.skipped]
     able = [(pick.engine, pick.profile, offered) for pick, offered in offers if offered is not None]
     choice.check_known(asked, able)  # first: a name that nobody knows is told without preparing anybody's run
     return [(pick.engine, pick.profile, _settings(case, pick, given)) for pick in own]
-
-
-def _offered(case: Case, pick: choice.Pick) -> Mapping[str, Any] | None:
-    """Return the settings that an engine offers for a case; None where it would not run."""
-    try:
-        return engines.load(pick.engine).offered(case, pick.profile)
-    except CaseUnsupported:
-        return None
 
 
 def _plain(value: Value) -> str:

@@ -16,6 +16,7 @@ import click
 
 from crossbody.cases.errors import OwnFault
 from crossbody.reports.judging.verdict import Row
+from crossbody.reports.pages.read_again import Run, beyond, by_run
 from crossbody.reports.pages.results import Times
 
 ERRORS = {
@@ -33,7 +34,6 @@ WIDEST = 12
 WRONG = ("outside", "crashed")
 _SENTENCE = re.compile(r"(\d+) of (\d+) runs (?:is|are) within all limits")
 _COUNT = re.compile(r"(\d+) ([a-z -]+?)(?: \((\d+) beyond a limit\))?(?:, |$)")
-Run = tuple[str, str]
 
 
 def check(printed: Sequence[str], rows: Sequence[Row], times: Times, width: int) -> None:
@@ -48,23 +48,13 @@ def check(printed: Sequence[str], rows: Sequence[Row], times: Times, width: int)
     Raises:
         OwnFault: naming what is another one.
     """
-    runs: dict[Run, list[Row]] = {}
-    for row in rows:
-        who = f"{row['engine']}:{row['profile']}"
-        runs.setdefault((f"{row['case']}:{row['variant']}", who), []).append(row)
+    runs = by_run(rows)
     plain = [" ".join(click.unstyle(text).split()) for text in printed]
     table = click.unstyle(printed[1]).splitlines() or [""]
     differing = [*_of_sentence(plain[0], runs), *_of_table(table, runs, times, width)]
     differing += [*_of_counts(plain[2], rows), *_of_lines(plain[3:], runs)]
     if differing:
         raise OwnFault(f"What was printed is not what was judged: {differing[0]}.")
-
-
-def beyond(row: Row) -> bool:
-    """Whether a number that is not judged is farther from what is expected than its limit."""
-    limit, expected = row["limit"], row["expected"]
-    off = abs(row["value"] - (0.0 if math.isnan(expected) else expected))
-    return bool(row["verdict"] == "not judged" and limit > 0.0 and off / limit > 1.0 and math.isfinite(off / limit))
 
 
 def counted(rows: Sequence[Row]) -> dict[str, int]:

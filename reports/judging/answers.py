@@ -44,8 +44,8 @@ class Answers:
         new = [times for times in asked if not any(_places(known.t, times) is not None for known in self._kept)]
         if len(new) < 2:
             return
-        once = distinct(np.concatenate(new))
-        twice = distinct(np.concatenate([times[1:][times[1:] == times[:-1]] for times in new]))
+        once = distinct(*new)
+        twice = distinct(*(times[1:][times[1:] == times[:-1]] for times in new))
         times = np.sort(np.concatenate([once, twice]))
         rows = self._kept[-1].lam.shape[1] if self._kept else 1
         if 8 * rows * len(times) <= ROOM:

@@ -48,9 +48,8 @@ def mistimed(clock: Clock, shown: Trajectory, took_s: float) -> Iterator[tuple[f
         yield shown.wall_s, f"The run of its own steps, {own.steps}, took {own.wall_s:.3g} s."
     if not own.wall_s <= clock.around_s + READ:
         yield own.wall_s, f"{clock.around_s:.3g} s passed around the run."
-    if (
-        0.0 < own.wall_s < max(PART * (clock.around_s - clock.compiled_s), STEP * own.steps)
-    ):  # 0 is no time, of one's own engine
+    least = max(PART * (clock.around_s - clock.compiled_s), STEP * own.steps)
+    if 0.0 < own.wall_s < least:  # 0 is no time, of one's own engine
         yield own.wall_s, f"{clock.around_s:.3g} s passed around the run, which took {own.steps} steps."
     if not 0.0 <= own.control_s <= own.wall_s:
         yield own.control_s, f"A controller took more than the whole run, {own.wall_s:.3g} s, or less than none."

@@ -6,8 +6,8 @@ that runs and judges are made of, plug-ins, versions of libraries, and the proce
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
+from types import ModuleType
 
 import numpy as np
 
@@ -37,6 +37,12 @@ def wrong() -> Iterator[Found]:
 
 def _asked() -> Iterator[Found]:
     """Ask all of them."""
+    for kind in kinds():
+        yield from kind.wrong()
+
+
+def kinds() -> tuple[ModuleType, ...]:
+    """Return the modules that ask, each by its `wrong`."""
     from crossbody.reports.judging import (
         known_answers,
         known_growth,
@@ -46,8 +52,7 @@ def _asked() -> Iterator[Found]:
         known_tables,
     )
 
-    for kind in (known_answers, known_sides, known_growth, known_parts, known_steps, known_tables):
-        yield from kind.wrong()
+    return known_answers, known_sides, known_growth, known_parts, known_steps, known_tables
 
 
 def _name() -> str:
@@ -62,5 +67,4 @@ def _name() -> str:
         str(debugging()),
         repr(sorted(installed.digests().items())),
     )
-    digest = hashlib.sha256("\0".join(depends).encode()).hexdigest()[:32]
-    return f"known_answers-{digest}"
+    return code_store.named("known_answers", *depends)

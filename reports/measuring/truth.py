@@ -78,11 +78,11 @@ def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 
     """
     events = np.array([e.t for e in run.events if e.t <= t_end])
     parts = [np.linspace(0.0, t_end, grid)]
-    edges = distinct(np.concatenate([[0.0], events, [t_end]]))
+    edges = distinct(0.0, events, t_end)
     short = [(a, b) for a, b in pairwise(edges) if b - a < 0.1 * t_end]
     each = min(inside, max(FEWEST, MOST // max(len(short), 1)))
     parts += [np.linspace(a, b, each)[1:-1] for a, b in short]
-    times: Floats = np.sort(np.concatenate([distinct(np.concatenate([*parts, events])), events]))
+    times: Floats = np.sort(np.concatenate([distinct(*parts, events), events]))
     return times[np.concatenate([[True, True], times[2:] > times[:-2]])] if len(times) > 2 else times
 
 

@@ -170,7 +170,7 @@ def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dic
     """A line of one engine through evenly chosen samples and those beside its events."""
     x, y = points
     near = np.searchsorted(trace.run.t, [event.t for event in trace.run.events])[: most // 4]
-    at = distinct(np.r_[np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1])
+    at = distinct(np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1)
     free = ~np.isfinite(x + y)
     at = np.r_[at, np.flatnonzero(free[1:] & ~free[:-1]) + 1]  # a line ends where a contact opens
     at, look = distinct(at[(at >= 0) & (at < len(x))]), style(trace, i)

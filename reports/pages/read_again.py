@@ -79,11 +79,8 @@ def check(out: Path, rows: Sequence[Row], times: Times) -> None:
     Raises:
         OwnFault: naming the page and the number that is another one.
     """
-    runs: dict[Run, list[Row]] = {}
     rows = [row | {name: _finite(row[name]) for name in NUMBERS} for row in rows]
-    for row in rows:
-        who = f"{row['engine']}:{row['profile']}"
-        runs.setdefault((f"{row['case']}:{row['variant']}", who), []).append(row)
+    runs = by_run(rows)
     labels = list(dict.fromkeys(label for label, _ in runs))
     pages = {f"case-{file_name(label)}.html": label for label in labels}
     for name in sorted(listed(out)):
@@ -101,6 +98,15 @@ def check(out: Path, rows: Sequence[Row], times: Times) -> None:
             differing += _of_times(tables, pages[name], times)
         if differing:
             raise OwnFault(f"{name} does not show what was judged: {differing[0]}.")
+
+
+def by_run(rows: Sequence[Row]) -> dict[Run, list[Row]]:
+    """Return the rows of every run, by case and engine, in their order."""
+    runs: dict[Run, list[Row]] = {}
+    for row in rows:
+        who = f"{row['engine']}:{row['profile']}"
+        runs.setdefault((f"{row['case']}:{row['variant']}", who), []).append(row)
+    return runs
 
 
 def _finite(value: float) -> float:

@@ -84,6 +84,14 @@ def _variants(name: str, variant: str | None) -> tuple[str, ...]:
     return (variant,) if variant is not None else cases.variants(name)
 
 
+def offered(case: Case, pick: Pick) -> Mapping[str, Any] | None:
+    """Return the settings that an engine offers for a case; None where it would not run."""
+    try:
+        return engines.load(pick.engine).offered(case, pick.profile)
+    except CaseUnsupported:
+        return None
+
+
 def picks(wanted: Sequence[str]) -> tuple[Pick, ...]:
     """Every engine and profile asked for; an engine that is not installed is a pick that says so.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter, process_time
 from typing import Any, TypeVar
@@ -29,7 +28,7 @@ from crossbody.reports.judging.run_verdicts import Entry, crash
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
-from crossbody.reports.runs.choice import Pick, check_known, of_case, of_pick
+from crossbody.reports.runs.choice import Pick, check_known, of_case, of_pick, offered
 
 FINEST_TOLERANCE = 1e-12
 LOOSER = 10.0
@@ -138,8 +137,7 @@ def _own(case: Case, pick: Pick, entry: Entry, settings: Mapping[str, Value]) ->
     """Return those of the settings that an engine was asked to take and has."""
     mine, known = of_pick(settings, pick), entry.settings
     if mine and not (known or pick.skipped):  # it did not get so far as to say which it used
-        with suppress(CaseUnsupported):
-            known = engines.load(pick.engine).offered(case, pick.profile)
+        known = offered(case, pick) or {}
     return {name: value for name, value in mine.items() if name in known}
 
 

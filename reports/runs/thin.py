@@ -25,5 +25,5 @@ def keep(t: Floats, y: Floats, events: Floats, points: int = POINTS) -> NDArray[
         return np.arange(len(t))
     chosen = MinMaxLTTBDownsampler().downsample(t, np.nan_to_num(y), n_out=points).astype(np.intp)
     near = np.searchsorted(t, events)[:, None] + np.arange(-BEFORE, AROUND - BEFORE)
-    kept: NDArray[np.intp] = distinct(np.concatenate([chosen, near.ravel(), [0, len(t) - 1]]))
+    kept: NDArray[np.intp] = distinct(chosen, near, [0, len(t) - 1])
     return kept[(kept >= 0) & (kept < len(t))]

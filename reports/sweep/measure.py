@@ -61,7 +61,7 @@ class Error:
 def instants(t_end: float) -> Floats:
     """When a run is looked at, s: what decays at once counts too, for the scale of what rests later."""
     even, early = SHARES
-    return distinct(np.concatenate([np.linspace(0.0, t_end, even), t_end * np.logspace(-12.0, 0.0, early)]))
+    return distinct(np.linspace(0.0, t_end, even), t_end * np.logspace(-12.0, 0.0, early))
 
 
 def error(case: Case, run: Trajectory, asked: Asked) -> Error:

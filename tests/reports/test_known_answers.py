@@ -14,7 +14,7 @@ from crossbody import cases, engines
 from crossbody.cases import Trajectory
 from crossbody.reports.judging import (
     judge_controls,
-    known_answers,
+    known,
     known_growth,
     known_parts,
     known_sides,
@@ -28,7 +28,7 @@ from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.metrics import event_gap
 
-KNOWN = (known_answers, known_growth, known_parts, known_sides, known_steps, known_tables)
+KNOWN = known.kinds()
 
 
 @pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
