@@ -86,7 +86,7 @@ PULLED = """
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_ledger_closes_inside_steps_while_a_force_grows(seed, rtol, tmp_path):
-    """A block is pulled ever harder, sticks and slides: steps are long, and work in them grows with the fourth power."""
+    """A block is pulled ever harder, sticks and slides: steps are long, and work in them grows with t^4."""
     rng = np.random.default_rng(seed)
     pull, path = rng.uniform(15.0, 40.0, 2), tmp_path / "pulled.xml"
     path.write_text(PULLED.format(mu=0.3, pull=f"{pull[0]} {pull[1]}"), encoding="utf-8")
