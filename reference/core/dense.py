@@ -32,7 +32,8 @@ def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
     if s.has_velocity:
         _bend(K, s, m, w, s.t_old, w.y, 0, w.bend[0])
         _bend(K, s, m, w, s.t_old + s.hs, w.y1, s.end, w.bend[1])
-    _travel(s, w)
+    if s.has_velocity or s.frictional:
+        _travel(s, w)
     return _powers_inside(K, s, m, w) if account else 0
 
 
