@@ -69,8 +69,9 @@ class Engine(ABC):
         orders: profile -> promised order of the error in its step `dt` or its tolerance `rtol`;
             the benchmark holds the observed one against it.
         steps: profile whose known deviations hide what it applies -> theta: a step of its setting `dt` moves by
-            dt (v + theta (v+ - v)); NaN without such steps. Those that it takes first, accelerations, friction
-            and the setting `restitution` are held against the law's (`crossbody.reports.judging.first_steps`).
+            dt (v + theta (v+ - v)); NaN without such steps, infinite where theta is a file's. Those that it takes
+            first, accelerations, friction and the setting `restitution` are held against the law's
+            (`crossbody.reports.judging.first_steps`).
         late: profiles of these whose contacts push by the force of the step before: none of a first blow is held.
         of_scenes: profile -> the one that stands for it in a scene, a robot's file say, where all
             profiles are meant.

@@ -88,7 +88,7 @@ class Mujoco(Engine):
     of_scenes: Mapping[str, str] = {"default": "as_is"}
     versions: Mapping[str, str] = {"mujoco": mujoco.__version__}
     orders: Mapping[str, float] = {"matched": 4.0, "default": 1.0, "as_is": 1.0}
-    steps: Mapping[str, float] = {"default": 1.0}
+    steps: Mapping[str, float] = {"default": 1.0, "as_is": math.inf}
     interpreted: Mapping[str, str] = {
         "matched": (
             "the loop over steps, the record, the search for events, the part of the law that solref cannot express"

@@ -22,7 +22,7 @@ from crossbody.cases import Case, CrossbodyError, Inputs, Trajectory
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import normalised
-from crossbody.cases.scene_contacts import WAYS, Contact, contacts
+from crossbody.cases.scene_contacts import WAYS, Contact, contacts, watched
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.measuring.equations import equations
 
@@ -165,7 +165,8 @@ def first_steps(
     same = all(row.ok for row in audited if row.quantity in ("M", "bias"))
     probe = Probe(case, *who, used, asked, theirs, system, same and "dt" in used and not math.isnan(theta))
     try:
-        return (*(_free(probe) if probe.steps else ()), *(() if who[1] in who[0].late else _blows(probe)))
+        touching = () if case.file or who[1] in who[0].late else _blows(probe)
+        return (*(_free(probe) if probe.steps else ()), *touching)
     except (CrossbodyError, np.linalg.LinAlgError):  # a state that the engine or the reference refuses
         return ()
 
@@ -179,14 +180,14 @@ def _of_law(a0: float, a1: float, b0: float, b1: float) -> float:
 
 def _plain(case: Case) -> bool:
     """Whether bodies, joints, shapes and inputs are all that there is, so that a state says all."""
-    return not (case.file or case.form or case.gates or case.control)
+    return not (case.form or case.gates or case.control)
 
 
 def _free(probe: Probe) -> Iterator[AuditRow]:
     """Step where nothing touches and everything moves."""
     gap, t_end = probe.theirs["gap"], PART * STEPS * probe.dt
     q = probe.placed(probe.opening, np.maximum(gap(probe.case.q0)[probe.opening], 0.0) + CLEAR)
-    if len(probe.held) or np.any(gap(q)[probe.opening] <= 0.5 * CLEAR):
+    if len(probe.held) or _has_more(probe) or np.any(gap(q)[probe.opening] <= 0.5 * CLEAR):
         return  # rows that are always on are soft in engines, and take their time
     v = np.random.default_rng(SEED).uniform(-FAST, FAST, len(probe.case.v0))
     quarters = np.linspace(0.0, t_end, 5)
@@ -200,8 +201,21 @@ def _free(probe: Probe) -> Iterator[AuditRow]:
     size = max(float(np.max(np.abs(wanted))), least) + bends / TOLERANCE
     changed = np.full(len(v), np.inf) if run is None else run.v[-1] - v
     yield _row("acceleration", changed / t_end, wanted / t_end, float(np.max(np.abs(changed - wanted))) / size)
-    if run is not None and size > 2.0 * least:
+    if run is not None and size > 2.0 * least and math.isfinite(probe.engine.steps[probe.profile]):
         yield from _places(probe, run)
+
+
+def _has_more(probe: Probe) -> bool:
+    """Whether a file as it stands has dry friction, soft in engines too, or pairs that no motion brings closer.
+
+    Engines let those rub that touch.
+    """
+    scene = probe.case.scene
+    if scene is None or not probe.case.file:
+        return False
+    return bool(np.any(np.asarray(probe.system.friction_loss) > 0.0)) or (
+        len(contacts(scene)) + len(watched(scene)) < len(scene.pairs)
+    )
 
 
 def _places(probe: Probe, run: Trajectory) -> Iterator[AuditRow]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -61,8 +62,10 @@ class ChangedRun(Run):
         return self.inner.audit()
 
 
-def told(label: str, who: str, change: Callable[[Trajectory], Trajectory] = lambda run: run) -> dict[str, AuditRow]:
-    case, (name, profile) = cases.load(*label.split(":")), who.split(":")
+def told(
+    label: str, who: str, change: Callable[[Trajectory], Trajectory] = lambda run: run, **given: float
+) -> dict[str, AuditRow]:
+    case, (name, profile) = cases.load(*label.split(":"), **given), who.split(":")
     pytest.importorskip({"dart": "dartpy"}.get(name, name))
     engine = engines.load(name)
     prepared = engine.prepare(case, profile)
@@ -189,3 +192,21 @@ def test_steep_friction_that_would_lift_or_jam_lets_slip_no_pair(who: str) -> No
     rows = first_steps(case, (engine, profile), engine.prepare(case, profile).settings, {}, (), theirs)
     assert rows
     assert all(row.ok for row in rows)
+
+
+FALLS = """<mujoco><worldbody><geom type="plane" size="2 2 1"/>
+<body name="ball" pos="0 0 .5"{spared}><freejoint/><geom type="sphere" size=".1" mass="1"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("who", ["mujoco:as_is", "dart:matched", "pinocchio:admm"])
+@pytest.mark.parametrize("spared", [0.0, 0.6])
+def test_a_file_falls_as_fast_as_its_law_has_it(who: str, spared: float, tmp_path: Path) -> None:
+    """Also with less weight, which every engine is given in its own way."""
+    path = tmp_path / "ball.xml"
+    path.write_text(FALLS.format(spared=f' gravcomp="{spared}"' if spared else ""))
+    right = told(str(path), who, friction=1)["acceleration"]
+    assert right.ok
+    assert f"{-9.81 * (1.0 - spared):.6g}" in right.mine.split()
+    wrong = told(str(path), who, faster, friction=1)
+    assert not wrong["acceleration"].ok
