@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.contacts import Contact, contacts
+from crossbody.cases.contacts import Contact
 from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Mode, Trajectory
 
@@ -27,7 +27,7 @@ _Pairs = list[tuple[Contact, Contact]]
 def matched(truth: Truth, run: Trajectory) -> _Pairs:
     """Contacts of truth and run, paired in order up to the first of another row or not trusted."""
     pairs: _Pairs = []
-    for a, b in zip(*(contacts(each, truth.joined) for each in (truth.trajectory, run)), strict=False):
+    for a, b in zip(*map(truth.contacts, (truth.trajectory, run)), strict=False):
         if a.row != b.row or a.touch > truth.trusted:
             break
         pairs.append((a, b))
