@@ -215,9 +215,7 @@ def gaps(plain: Plain) -> Iterator[Control]:
         every = PART * max(float(np.max(np.abs(run.gap))), least)
         own, wide = float(np.max(np.abs(run.gap[:, k]))), -(-len(run.t) // LOOKED)
         most = (1.0 + SLACK) * some / own if own > 0.0 else np.inf  # its bodies may be farther than it ever opens
-        part = (
-            PART if run.gap[:, rows].any() or run.q.any() else some
-        )  # at the origin errors are absolute
+        part = PART if run.gap[:, rows].any() or run.q.any() else some  # at the origin errors are absolute
         for i, sign in plain.both():
             yield Control(
                 fault=f"the gap of row {k} {sign * some:.3g} off at one sample",

@@ -8,13 +8,15 @@ truth's instants; how far they were off is a number of its own (metric event_tim
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.contacts import Contact
+from crossbody.cases.defaults import shortest
 from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Mode, Trajectory
 
@@ -68,7 +70,11 @@ def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDAr
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run, releases)
     inside = _known(truth, t)
-    return inside, truth.at(t[inside])
+    exact, sides = truth.at(t[inside]), _sides(truth, t[inside])
+    if not np.array_equal(sides, exact.t):
+        jumps = truth.at(sides)
+        exact = replace(exact, lam=jumps.lam, mode=jumps.mode)
+    return inside, exact
 
 
 def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
@@ -76,7 +82,25 @@ def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
     for run in runs:
         for releases in (False, True):
             t = clock(truth, run, releases)
-            yield t[_known(truth, t)]
+            known = t[_known(truth, t)]
+            yield from (known, _sides(truth, known))
+
+
+def _sides(truth: Truth, t: Floats) -> Floats:
+    """Return the instants (n,) at which a truth tells what jumps: its own event where one stands twice and is as near.
+
+    As near as instants are judged to: between the two events one side alone would be beside both samples of a run,
+    which counts for half a step of it.
+    """
+    events, twice = distinct([event.t for event in truth.trajectory.events]), t[1:][t[1:] == t[:-1]]
+    sides = np.array(t)
+    for here in distinct(twice) if len(events) else ():
+        near = float(events[np.argmin(np.abs(events - here))])
+        first, last = np.searchsorted(t, here, side="left"), np.searchsorted(t, here, side="right")
+        before, behind = np.concatenate([[-np.inf], t, [np.inf]])[[first, last + 1]]
+        if before < near < behind and abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
+            sides[first:last] = near
+    return sides
 
 
 def _known(truth: Truth, t: Floats) -> NDArray[np.bool_]:
