@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases.arrays import Floats, distinct
+from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import Contact
 from crossbody.cases.defaults import shortest
 from crossbody.cases.remembered import remembered
@@ -70,7 +70,7 @@ def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDAr
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run, releases)
     inside = _known(truth, t)
-    exact, sides = truth.at(t[inside]), _sides(truth, t[inside])
+    exact, sides = truth.at(t[inside]), _sides(truth, run, t[inside])
     if not np.array_equal(sides, exact.t):
         jumps = truth.at(sides)
         exact = replace(exact, lam=jumps.lam, mode=jumps.mode)
@@ -83,24 +83,38 @@ def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
         for releases in (False, True):
             t = clock(truth, run, releases)
             known = t[_known(truth, t)]
-            yield from (known, _sides(truth, known))
+            yield from (known, _sides(truth, run, known))
 
 
-def _sides(truth: Truth, t: Floats) -> Floats:
-    """Return the instants (n,) at which a truth tells what jumps: its own event where one stands twice and is as near.
+def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
+    """Return the instants (n,) at which a truth tells what jumps: its own event where the run tells both sides of it.
 
-    As near as instants are judged to: between the two events one side alone would be beside both samples of a run,
-    which counts for half a step of it.
+    That is one of the same row and mode which is as near as instants are judged to, with no other sample between:
+    between the two events one side alone would be beside both samples of the run, which counts for half a step of it.
     """
-    events, twice = distinct([event.t for event in truth.trajectory.events]), t[1:][t[1:] == t[:-1]]
-    sides = np.array(t)
-    for here in distinct(twice) if len(events) else ():
-        near = float(events[np.argmin(np.abs(events - here))])
-        first, last = np.searchsorted(t, here, side="left"), np.searchsorted(t, here, side="right")
-        before, behind = np.concatenate([[-np.inf], t, [np.inf]])[[first, last + 1]]
-        if before < near < behind and abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
+    theirs: dict[tuple[int, Mode], list[float]] = {}
+    for event in truth.trajectory.events:
+        theirs.setdefault((event.contact, event.after), []).append(event.t)
+    known, sides, moved = {event.t for event in truth.trajectory.events}, np.array(t), list[slice]()
+    for event in run.events:
+        first, last = (int(np.searchsorted(run.t[: len(t)], event.t, side=side)) for side in ("left", "right"))
+        if last - first < 2 or (here := float(t[first])) in known:
+            continue
+        near = min(theirs.get((event.contact, event.after), []), key=lambda x, here=here: abs(x - here), default=np.inf)
+        if abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
             sides[first:last] = near
+            moved.append(slice(first, last))
+    while wrong := [one for one in moved if _crosses(sides, one)]:
+        for one in wrong:
+            sides[one] = t[one]
+            moved.remove(one)
     return sides
+
+
+def _crosses(t: Floats, one: slice) -> bool:
+    """Whether instants (n,) that are one are not behind the instant before them, or not before the one behind."""
+    before, behind = t[max(one.start - 1, 0) : one.start], t[one.stop : one.stop + 1]
+    return bool(np.any(before >= t[one.start]) or np.any(behind <= t[one.start]))
 
 
 def _known(truth: Truth, t: Floats) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crossbody import cases
-from crossbody.cases import Tier, Trajectory
+from crossbody.cases import Event, Mode, Tier, Trajectory
 from crossbody.cases.defaults import shortest
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import aligned, instants
@@ -78,3 +78,27 @@ def test_samples_between_two_events_part_them() -> None:
     off = 0.5 * shortest(CASE.t_end)
     _, exact = aligned(TRUTH, turned(off, np.array([0.0, TURN + 0.5 * off, CASE.t_end])))
     assert np.ptp(exact.lam[exact.t == TURN + off], axis=0).max() == 0.0
+
+
+def pushed(at: np.ndarray, t: np.ndarray) -> Trajectory:
+    """Rows that push with 1 N each from instants (n,) on, s, and slip then; told at times t, and on both sides."""
+    t = np.sort(np.concatenate([t, *[at, at]]))
+    again = np.append(False, t[1:] == t[:-1])
+    on = (t[:, None] > at) | ((t[:, None] == at) & again[:, None])
+    rest = np.ones((len(t), 1))
+    return Trajectory(
+        t=t, q=rest, v=rest, gap=0.0 * on, lam=on.astype(float), energy=np.hstack([rest, rest]),
+        mode=np.where(on, Mode.SLIP, Mode.STICK).astype(np.int8),
+        events=tuple(Event(t=x, contact=row, before=Mode.STICK, after=Mode.SLIP) for row, x in enumerate(at.tolist())),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_jumps_of_several_rows_that_are_nearer_to_each_other_than_a_run_is_to_its_truth(seed: int) -> None:
+    """Each is beside its own."""
+    draw = np.random.default_rng(seed)
+    at = 0.5 + np.cumsum(draw.uniform(1e-9, 1e-8, 3))
+    late, t = draw.choice([-1.0, 1.0]) * draw.uniform(1e-9, 1e-7), np.array([0.0, *draw.uniform(0.0, 0.4, 5), 1.0])
+    truth = from_run(pushed(at, np.sort(np.append(t, 0.9))), Tier.A, "made up")
+    run = pushed(at + late, np.sort(t))
+    np.testing.assert_array_equal(aligned(truth, run)[1].lam, run.lam)
