@@ -100,7 +100,8 @@ def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
         first, last = (int(np.searchsorted(run.t[: len(t)], event.t, side=side)) for side in ("left", "right"))
         if last - first < 2 or (here := float(t[first])) in known:
             continue
-        near = min(theirs.get((event.contact, event.after), []), key=lambda x, here=here: abs(x - here), default=np.inf)
+        times = np.array(theirs.get((event.contact, event.after), [np.inf]))
+        near = float(times[np.argmin(np.abs(times - here))])
         if abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
             sides[first:last] = near
             moved.append(slice(first, last))
