@@ -121,6 +121,8 @@ class Law:
         a2 (nc,): 1/(m^2 s^2).
         b0, b1 (nc,): fast constants of COLLISION in the units of a0, a1; zero where a row has one set.
         unilateral (nc,): False for a constraint that is always on.
+        touches (nc,): which rows begin and end contacts: those that can open, if not given. False for what has
+            no gap of its own: rows of friction, which hold while another row presses, or always.
     """
 
     a0: Floats
@@ -129,6 +131,7 @@ class Law:
     unilateral: NDArray[np.bool_]
     b0: Floats = field(default_factory=lambda: np.zeros(0))
     b1: Floats = field(default_factory=lambda: np.zeros(0))
+    touches: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def __post_init__(self) -> None:
         """Check shapes and signs."""
@@ -147,6 +150,10 @@ class Law:
                 "the constants of COLLISION must be faster than those of CONTACT, or 0 for one set."
             )
         object.__setattr__(self, "unilateral", frozen("Law", "unilateral", self.unilateral, (nc,), np.bool_))
+        touches = self.touches if np.size(self.touches) else self.unilateral
+        object.__setattr__(self, "touches", frozen("Law", "touches", touches, (nc,), np.bool_))
+        if wrong := np.flatnonzero(self.touches & ~self.unilateral).tolist():
+            raise SceneError(f"Law.touches names rows {wrong}, which are always on; valid: rows that can open.")
 
     @property
     def linear(self) -> bool:

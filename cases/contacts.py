@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.cases.remembered import remembered
@@ -47,19 +49,25 @@ class Contact:
 
 
 @remembered(8)
-def contacts(run: Trajectory, joined: bool = False) -> tuple[Contact, ...]:
+def contacts(run: Trajectory, touches: NDArray[np.bool_] | None = None, joined: bool = False) -> tuple[Contact, ...]:
     """Every contact in order of its touch; joined, those between which no gap opens are one.
 
     From the run's events; a run without a notion of mode is read by the sign of its gaps instead.
     Joined, a row that stays at its surface from the start to the end, or from one contact to the next,
     is in contact all along: which of two rows pushes that depend on each other, whether one pushes
     that bears nothing, and what the sign of its gap is, are rounding and no properties of the motion.
+
+    Args:
+        run: whose contacts.
+        touches (nc,): rows that have some (`Law.touches`); all if not given.
+        joined: whether to join them.
     """
+    some = np.flatnonzero(np.ones(run.gap.shape[1], dtype=bool) if touches is None else touches).tolist()
     if not run.events and run.mode.size and np.all(run.mode == -1):
-        return _by_sign(run)
+        return _by_sign(run, some)
     found: list[Contact] = []
     last: dict[int, int] = {}
-    for event in run.events:
+    for event in (event for event in run.events if event.contact in some):
         if event.after in CLOSED and event.before not in CLOSED:
             last[event.contact] = len(found)
             found.append(Contact(event.contact, event.t))
@@ -67,8 +75,8 @@ def contacts(run: Trajectory, joined: bool = False) -> tuple[Contact, ...]:
             found[last[event.contact]] = found[last[event.contact]].behind(event)
     if not joined:
         return tuple(found)
-    rests, rows = _Rests(run), range(run.gap.shape[1])
-    kept = [c for row in rows for c in rests.joined(row, [c for c in found if c.row == row])]
+    rests = _Rests(run)
+    kept = [c for row in some for c in rests.joined(row, [c for c in found if c.row == row])]
     return tuple(sorted(kept, key=lambda c: c.touch))
 
 
@@ -86,7 +94,7 @@ class _Rests:
 
         One that begins where the one before ends is the same: modes were tried at that instant.
         """
-        if (own and self._led(row)) or (self.mode[:, row] < 0).any():
+        if (self.mode[:, row] < 0).any():
             return own
         if len(self.t) and self._stays(row, self.t[0], np.inf) and self.mode[0, row] != Mode.BILATERAL:
             return [Contact(row, float(self.t[0]))]
@@ -101,13 +109,6 @@ class _Rests:
         if found and self._stays(row, found[-1].release, np.inf):
             found[-1] = replace(found[-1], release=np.inf, free=np.inf)
         return found
-
-    def _led(self, row: int) -> bool:
-        """Whether a row without a gap (slip) has its mode from another."""
-        if self.gap[:, row].any():
-            return False
-        same = (self.mode == self.mode[:, [row]]).all(axis=0)
-        return bool((same & self.gap.any(axis=0)).any())
 
     def _stays(self, row: int, start: float, end: float) -> bool:
         """Whether a row is at its surface at all samples from one instant to another."""
@@ -124,9 +125,9 @@ class _Rests:
         return sampled and light and self._stays(c.row, c.touch, c.release)
 
 
-def _by_sign(run: Trajectory) -> tuple[Contact, ...]:
+def _by_sign(run: Trajectory, rows: Sequence[int]) -> tuple[Contact, ...]:
     found = []
-    for row in range(run.gap.shape[1]):
+    for row in rows:
         gap = run.gap[:, row]
         down, up = (_crossings(run.t, sign * gap) for sign in (1.0, -1.0))
         found += [Contact(row, t, float(min(up[up > t], default=np.inf))) for t in down]

@@ -61,7 +61,7 @@ def default_limits(case: Case) -> tuple[Limit, ...]:
     """Limits on position, velocity, force, energy, events and drift, where the case's rows have such."""
     everyone = tuple(Limit(metric=metric, value=value, why=why) for metric, value, why in _defaults(case))
     everyone += (*_FRICTION, _OF_DART) if case.rubs else ()
-    if not case.law.unilateral.any():
+    if not case.law.touches.any():
         return everyone
     located = (
         Limit(metric="event_gap", value=1e-6, engine=engine, profile=profile, why=_LOCATED)
@@ -87,7 +87,7 @@ def _defaults(case: Case) -> Iterator[tuple[str, float, str]]:
     yield "law_residual", 1e-6, "the law's own equation at every state, with the rounding of stiff rows"
     yield "lam_impulse_path", 1e-5, _FASTER
     yield "contact_work", 1e-6, _TOLERANCE
-    if case.law.unilateral.any():
+    if case.law.touches.any():
         yield "gap_error", 1e-6, _TOLERANCE
         yield "event_gap", 1.0, _ON_THE_GRID
         yield "complementarity", 1e-6, "contacts only push, to the precision of the instant of release"

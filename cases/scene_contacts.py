@@ -327,7 +327,7 @@ def _places(one: Shape, two: Shape) -> int:
 
 
 def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
-    """Return names, laws and whether they can open, of the rows in the order of all engines."""
+    """Return names, laws and whether they can open, of the rows in the order of all engines; rows of friction last."""
     names, laws, unilateral = [], [], []
     for loop in scene.loops:
         for k in range(loop.width):
@@ -357,6 +357,11 @@ def rows_of(scene: Scene) -> tuple[list[str], list[RowLaw], list[bool]]:
     return names, laws, unilateral
 
 
+def without_gap(scene: Scene) -> int:
+    """Return how many rows have no gap: the last ones, tangential or of dry friction."""
+    return sum(len(contact.tangents) for contact in contacts(scene)) + sum(width for _, width in scene.dry)
+
+
 def turning(scene: Scene) -> set[str]:
     """Return the names of the rows whose gap is an angle: their multipliers are torques."""
     joints = {joint.name for joint in scene.joints if joint.type in ("hinge", "ball")}
@@ -375,7 +380,9 @@ def law_of(scene: Scene) -> Law:
     """Return the constants of a scene's rows."""
     _, laws, unilateral = rows_of(scene)
     a0, a1, a2, b0, b1 = np.array([dataclasses.astuple(one) for one in laws]).reshape(-1, 5).T
-    return Law(a0=a0, a1=a1, a2=a2, b0=b0, b1=b1, unilateral=np.array(unilateral, dtype=bool))
+    opens = np.array(unilateral, dtype=bool)
+    touches = opens & (np.arange(len(laws)) < len(laws) - without_gap(scene))
+    return Law(a0=a0, a1=a1, a2=a2, b0=b0, b1=b1, unilateral=opens, touches=touches)
 
 
 def under_law(scene: Scene, law: Law) -> Scene:

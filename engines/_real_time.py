@@ -15,9 +15,9 @@ from crossbody.cases.arrays import Floats
 def one_set(law: Law) -> Law:
     """Return the constants of a row just entered as its only: those of COLLISION where it has two sets."""
     quick = law.b0 > 0.0
-    return Law(
-        a0=np.where(quick, law.b0, law.a0), a1=np.where(quick, law.b1, law.a1),
-        a2=np.where(quick, 0.0, law.a2), unilateral=law.unilateral,
+    return replace(
+        law, a0=np.where(quick, law.b0, law.a0), a1=np.where(quick, law.b1, law.a1),
+        a2=np.where(quick, 0.0, law.a2), b0=0.0 * law.b0, b1=0.0 * law.b1,
     )  # fmt: skip
 
 

@@ -12,7 +12,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from crossbody.cases import Case, CaseUnsupported
+import numpy as np
+
+from crossbody.cases import Case, CaseUnsupported, SceneError
 from crossbody.cases.errors import KernelError, OwnFault
 from crossbody.cases.installed import from_file
 from crossbody.cases.remembered import remembered
@@ -66,7 +68,10 @@ def has_equations(case: Case) -> bool:
 
 @remembered(4)
 def _built(build: Callable[..., System], parameters: Any, law: Any) -> System:
-    return build(parameters, law)
+    made = build(parameters, law)
+    if wrong := np.flatnonzero(law.touches & (np.asarray(made.follows) >= 0)).tolist():
+        raise SceneError(f"Rows {wrong} are rows of friction, which have no gap: Law.touches must be False for them.")
+    return made
 
 
 def system_of(case: Case) -> System:

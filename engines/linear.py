@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crossbody.cases import Case, Law, Mode
+from crossbody.cases import Case, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Modes
 
@@ -87,4 +87,4 @@ class Chart:
 def in_contact(case: Case) -> Case:
     """The case with the constants of CONTACT as the only ones of its rows."""
     law = case.law
-    return replace(case, law=Law(a0=law.a0, a1=law.a1, a2=law.a2, unilateral=law.unilateral), claims=())
+    return replace(case, law=replace(law, b0=0.0 * law.b0, b1=0.0 * law.b1), claims=())

@@ -80,9 +80,8 @@ class Probe:
 
     def __post_init__(self) -> None:
         """Tell rows apart."""
-        own = (np.asarray(self.system.follows) < 0) & (np.asarray(self.system.friction_loss) == 0.0)
-        self.opening = np.flatnonzero(own & self.case.law.unilateral)
-        self.held = np.flatnonzero(own & ~self.case.law.unilateral)
+        self.opening = np.flatnonzero(self.case.law.touches)
+        self.held = np.flatnonzero((np.asarray(self.system.follows) < 0) & ~self.case.law.unilateral)
 
     @property
     def dt(self) -> float:

@@ -25,8 +25,8 @@ Answers = Mapping[str, float | None]
 
 UNLIKE = (("m", "rad", "m", "rad", "m"), (True, False, True, True))
 HELD = (("rad", "rad", "rad"), (False, False))
-MADE = ((*UNLIKE, 1), (*HELD, 3), (("m",), (True,), 4))
-"""Units of coordinates, which rows open, and seed, of the motions of which every run asks."""
+MADE = ((*UNLIKE, 1, 2), (*HELD, 3, 0), (("m",), (True,), 4, 0))
+"""Units of coordinates, which rows open, seed, and number of rows of friction, of motions of which every run asks."""
 
 
 @cache
@@ -37,8 +37,8 @@ def wrong() -> tuple[tuple[str, float, Range, str], ...]:
     """
     told: set[str] = set()
     found: list[tuple[str, float, Range, str]] = []
-    for units, opens, seed in MADE:
-        made = MadeUp(case_of(units, opens, seed), seed)
+    for units, opens, seed, rubs in MADE:
+        made = MadeUp(case_of(units, opens, seed, rubs), seed)
         wanted = {name: value for name, value in answers(made).items() if name not in told}
         found += _wrong(made, wanted)
         told |= {name for name, value in wanted.items() if value is not None}
@@ -126,8 +126,9 @@ def _energies(made: MadeUp) -> Answers:
 
 
 def _gaps(made: MadeUp) -> Answers:
-    """Gaps of rows that open, and of those that do not."""
-    k, run, exact, opens = made.trusted, made.run, made.exact, made.case.law.unilateral
+    """Gaps of rows that touch, and of those that are always on."""
+    k, run, exact, opens = made.trusted, made.run, made.exact, made.case.law.touches
+    on = ~made.case.law.unilateral
     deep, right = np.minimum(run.gap[:, opens], 0.0), np.minimum(exact.gap[:, opens], 0.0)
     apart = float(np.max(np.abs(deep - right)[:k], initial=0.0))
     found: dict[str, float | None] = (
@@ -136,10 +137,10 @@ def _gaps(made: MadeUp) -> Answers:
     if not made.case.mechanism and opens.any():
         found["gap_error"] = float(np.abs(run.gap - exact.gap)[:k, opens].max() / np.abs(exact.gap[:, opens]).max())
     return found | {
-        "constraint_drift": None if opens.all() else float(np.abs(run.gap[:, ~opens]).max()),
+        "constraint_drift": float(np.abs(run.gap[:, on]).max()) if on.any() else None,
         "penetration": -float(deep.min()) if opens.any() else None,
         "penetration_error": apart / -float(right.min()) if opens.any() else None,
-        "final_gap": float(min(run.gap[-1])),
+        "final_gap": float(min(run.gap[-1, ~made.rubs])),
     }
 
 
@@ -175,7 +176,7 @@ def _multipliers(made: MadeUp) -> Answers:
 
 def _pulls(made: MadeUp) -> Answers:
     """Multipliers that pull, or act on rows that are open, by the largest of those that open."""
-    rows = np.flatnonzero(made.case.law.unilateral)
+    rows = np.flatnonzero(made.case.law.touches)
     if not len(rows):
         return {"complementarity": None}
     lam, free = made.run.lam[:, rows], made.run.mode[:, rows] == Mode.FREE
@@ -196,10 +197,11 @@ def _settles(event: Event) -> bool:
 
 def _counts(made: MadeUp) -> Answers:
     """How often a made-up run does what its truth does."""
-    events, opens = made.run.events, bool(made.case.law.unilateral.any())
-    blows = [e.impulse for e in events if e.impulse]
+    events, touches = made.run.events, made.case.law.touches
+    blows, count = [e.impulse for e in events if e.impulse], 0.0 if touches.any() else None
     return {
-        "touch_count": 0.0, "release_count": 0.0 if opens else None, "contacts": float(sum(map(_begins, events))),
+        "touch_count": count, "release_count": count,
+        "contacts": float(sum(_begins(e) and touches[e.contact] for e in events)),
         "bounces": float(sum(e.after == Mode.FREE for e in events)), "transitions": float(len(events)),
         "collision_impulse": float(sum(blows)) if blows else None,
     }  # fmt: skip
@@ -229,8 +231,8 @@ def _instants(made: MadeUp) -> Answers:
 
 def _surfaces(made: MadeUp) -> Answers:
     """How far gaps are from zero at touches, and gaps or multipliers at releases, by their longest ways."""
-    run, opens = made.run, made.case.law.unilateral
-    if not opens.any():
+    run, touches = made.run, made.case.law.touches
+    if not touches.any():
         return {"event_gap": None}
 
     def ways(signal: Floats, t: float, nothing: float) -> float:
@@ -240,7 +242,7 @@ def _surfaces(made: MadeUp) -> Answers:
 
     near, light = 1e-10 * max(1.0, float(np.abs(run.q).max())), 1e-12 * max(1.0, float(np.abs(run.lam).max()))
     found = [0.0]
-    for e in run.events:
+    for e in (e for e in run.events if touches[e.contact]):
         gap, push = ways(run.gap[:, e.contact], e.t, near), ways(run.lam[:, e.contact], e.t, light)
         found += [gap] if _begins(e) else [min(gap, push)] if _ends(e) else []
     return {"event_gap": max(found)}

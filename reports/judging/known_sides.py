@@ -8,14 +8,15 @@ from functools import cache
 import numpy as np
 
 from crossbody.cases import Event, Mode, Tier, Trajectory
+from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.made_up import case_of
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.measuring.truth import from_run
 
 TOUCH, END = 0.2, 1.0
-LATE, COARSE, FINE = 1e-3, 0.05, 1e-3
-"""By how much a release comes late, s, and steps of a run and of its truth."""
+LATE, HAIR, COARSE, FINE = 1e-3, 1e-13, 0.05, 1e-3
+"""By how much a release comes late, and a turn is off, s, and steps of a run and of its truth."""
 LEFT, DEEP, SAME = 0.3, 0.4, 1e-6
 """Force that a row lets go of, of 1 N, its gap there, of ways of 1 m, and part by which an answer may differ."""
 Found = tuple[str, float, Range, str]
@@ -26,15 +27,20 @@ def wrong() -> tuple[Found, ...]:
     """Return metric, number, least and most, and motion, of what is another number than it must be."""
     return tuple(
         (name, found, (wanted, wanted), said)
-        for name, found, wanted, said in (*_sides(), *_impulses())
+        for name, found, wanted, said in (*_sides(), *_impulses(), *_turns())
         if not abs(found - wanted) <= SAME * max(wanted, SAME)
     )  # fmt: skip
 
 
+def sampled(step: float, jump: float, *more: float) -> Floats:
+    """Return instants at steps of a run, s, with one at which something jumps, twice, and more."""
+    grid = np.arange(0.0, END + 0.5 * step, step)
+    return np.sort(np.concatenate([grid[np.abs(grid - jump) > 1e-9], more, [jump] * 2]))
+
+
 def pressed(release: float, step: float) -> Trajectory:
     """Return a row that bears 1 N from TOUCH on until it lets go, s, at steps of a run; every jump from both sides."""
-    grid = np.arange(0.0, END + 0.5 * step, step)
-    t = np.sort(np.concatenate([grid[np.abs(grid - release) > 1e-9], [TOUCH], [release] * 2]))
+    t = sampled(step, release, TOUCH)
     order = np.arange(len(t))
     on = (order >= np.searchsorted(t, TOUCH, side="right") - 1) & (order <= np.searchsorted(t, release, side="left"))
     modes = (Mode.FREE, Mode.CONTACT, Mode.FREE)
@@ -83,6 +89,26 @@ def _impulses() -> Iterator[tuple[str, float, float, str]]:
     for late in (-LATE, LATE):
         found = _measured("lam_impulse_path", pressed(release, FINE), pressed(release + late, COARSE), case)
         yield "lam_impulse_path", found, LATE / (release - TOUCH), "a force that ends late"
+
+
+def turned(at: float, step: float) -> Trajectory:
+    """Return a row that friction holds back with 1 N, s, and from an instant on with as much the other way."""
+    t = sampled(step, at)
+    column, before = np.linspace(0.0, 1.0, len(t))[:, None], np.arange(len(t)) <= np.searchsorted(t, at, side="left")
+    modes = ((0.0, Mode.FREE), (at, Mode.SLIP))
+    return Trajectory(
+        t=t, q=column, v=column, gap=0.0 * column, lam=np.where(before, 1.0, -1.0)[:, None],
+        energy=np.hstack([column, column]), mode=np.full((len(t), 1), Mode.SLIP, dtype=np.int8),
+        events=tuple(Event(t=t, contact=0, before=mode, after=Mode.SLIP) for t, mode in modes),
+    )  # fmt: skip
+
+
+def _turns() -> Iterator[tuple[str, float, float, str]]:
+    """Ask for the impulse of a force that turns round a hair beside where it does so in the truth: nothing is off."""
+    case, at = case_of(("m",), (), 1, rubs=1), 0.6
+    for off in (-HAIR, HAIR):
+        found = _measured("lam_impulse", turned(at, FINE), turned(at + off, COARSE), case)
+        yield "lam_impulse", found, 0.0, "a force that turns round"
 
 
 def _measured(name: str, exact: Trajectory, run: Trajectory, case: object) -> float:

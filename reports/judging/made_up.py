@@ -23,20 +23,24 @@ HAIR, NEAR = 1e-4, 1e-5
 NAMES = ("q", "v", "gap", "lam", "energy")
 
 
-def case_of(units: Sequence[str], opens: Sequence[bool], seed: int) -> Case:
+def case_of(units: Sequence[str], opens: Sequence[bool], seed: int, rubs: int = 0) -> Case:
     """Return a case without equations, of coordinates with these units and rows of which some open.
 
     Args:
         units: of each coordinate.
-        opens: whether each row can open.
+        opens: whether each row with a gap can open.
         seed: of the draw of its start.
+        rubs: number of rows of friction behind them, which have no gap.
     """
-    draw, rows = np.random.default_rng(seed), len(opens)
+    draw, rows = np.random.default_rng(seed), len(opens) + rubs
     return Case(
         name="made_up", variant=str(seed), title="", mechanism="", parameters={}, contacts=("",) * rows,
         coordinates=tuple(Coordinate(name=f"{k}", unit=unit) for k, unit in enumerate(units)),
         q0=draw.normal(size=len(units)), v0=draw.normal(size=len(units)), t_end=float(draw.uniform(0.5, 3.0)),
-        law=Law(a0=np.full(rows, 1e4), a1=np.ones(rows), a2=np.zeros(rows), unilateral=np.array(opens, dtype=bool)),
+        law=Law(
+            a0=np.full(rows, 1e4), a1=np.ones(rows), a2=np.zeros(rows), unilateral=np.array([*opens, *[True] * rubs]),
+            touches=np.array([*opens, *[False] * rubs]),
+        ),
     )  # fmt: skip
 
 
@@ -47,10 +51,12 @@ class MadeUp:
         case, truth, run: as metrics take them.
         exact: the truth's samples, each beside its own of the run, at the instants `t` (n,), s.
         trusted: number of samples that may be compared.
+        rubs (nc,): rows of friction, of which the run tells a touch, before all others, and the truth nothing.
     """
 
     def __init__(self, case: Case, seed: int, samples: int = SAMPLES) -> None:
         self.random, self.case = np.random.default_rng(seed), case
+        self.rubs = case.law.unilateral & ~case.law.touches
         events = self._contacts()
         before = [(1.0 - HAIR) * e.t for e in events]  # a sample there tells how fast what brings them about is
         self.t = np.sort([0.0, *self.random.uniform(0.0, case.t_end, samples - 1), *before])
@@ -58,8 +64,9 @@ class MadeUp:
         until = float(self.random.uniform(max(self.knots[-1], 0.7 * case.t_end), 0.99 * case.t_end))
         self.trusted, self.run = int(np.sum(self.t <= until)), self._off()
         self.truth = Truth(
-            tier=Tier.A, source="made up", trajectory=self.exact, at=self.lookup, agreement={}, trusted=until
-        )
+            tier=Tier.A, source="made up", trajectory=self.exact, at=self.lookup, agreement={}, trusted=until,
+            touches=case.law.touches, joined=True,
+        )  # fmt: skip
 
     @property
     def scalar(self) -> bool:
@@ -82,12 +89,14 @@ class MadeUp:
             changed["q"][:near] = exact.q[:near] + NEAR * (changed["q"][:near] - exact.q[:near])
         if self.scalar:
             changed["gap"] = changed["q"]
+        changed["gap"][:, self.rubs] = 0.0
         ledger = Ledger(
             contact=book.contact + 0.1 * random.normal(size=book.contact.shape),
             input=book.input + random.normal(size=n), dissipated=book.dissipated + random.normal(size=n),
         )  # fmt: skip
         events = tuple(replace(e, t=float(self.late(e.t)), impulse=1.3 * e.impulse) for e in exact.events)
-        return replace(exact, t=self.late(self.t), events=events, ledger=ledger, **changed)
+        first = [replace(e, t=0.5 * e.t, contact=row) for e in events[:1] for row in np.flatnonzero(self.rubs).tolist()]
+        return replace(exact, t=self.late(self.t), events=(*first, *events), ledger=ledger, **changed)
 
     def _motion(self, t: Floats, events: Sequence[Event]) -> Trajectory:
         """Return waves, with contacts at random and impulses that take no time."""
@@ -111,7 +120,7 @@ class MadeUp:
 
     def _contacts(self) -> list[Event]:
         """Return contacts that end, one row after the other; behind every other one a blow in no time."""
-        random, rows, t_end = self.random, np.flatnonzero(self.case.law.unilateral).tolist(), self.case.t_end
+        random, rows, t_end = self.random, np.flatnonzero(self.case.law.touches).tolist(), self.case.t_end
         found: list[Event] = []
         ends = np.sort(random.uniform(0.05, 0.95, 2 * CONTACTS)) * t_end
         for k, (touch, release) in enumerate(ends.reshape(-1, 2).tolist() if rows else ()):
@@ -125,10 +134,10 @@ class MadeUp:
         return found
 
     def _apart(self, gap: Floats) -> Floats:
-        """Return gaps (n, nc) of which those of rows that open are the highest, and those of others the deepest."""
+        """Return gaps (n, nc): those of rows that open are highest, those of others deepest, and friction has none."""
         even = gap / np.abs(gap).max(axis=0, initial=1e-300) * self.random.uniform(0.5, 1.5, gap.shape[1])
         found: Floats = np.where(self.case.law.unilateral, np.where(even > 0.0, 12.0 * even, even), 4.0 * even)
-        return found
+        return np.where(self.rubs, 0.0, found)
 
     def _waves(self, t: Floats, width: int) -> Floats:
         random = self.random

@@ -98,7 +98,7 @@ class Plain:
         around = np.stack([np.maximum(behind - 1, 0), np.minimum(behind, len(happens) - 1)])
         nearest = np.min(np.abs(run.t - happens[around]), axis=0)
         self.quiet = np.flatnonzero(nearest > QUIET * self.case.t_end)
-        self.normal = np.flatnonzero(self.case.law.unilateral & run.gap.any(axis=0))
+        self.normal = np.flatnonzero(self.case.law.touches)
         self.turning = frozenset(i + k for i in self.case.quaternions for k in range(4))
 
     def samples(self, among: NDArray[np.bool_] | None = None) -> list[int]:
@@ -215,10 +215,11 @@ def gaps(plain: Plain) -> Iterator[Control]:
         every = PART * max(float(np.max(np.abs(run.gap))), least)
         own, wide = float(np.max(np.abs(run.gap[:, k]))), -(-len(run.t) // LOOKED)
         most = (1.0 + SLACK) * some / own if own > 0.0 else np.inf  # its bodies may be farther than it ever opens
+        part = PART if run.gap[:, rows].any() or run.q.any() else some  # at the origin errors are absolute
         for i, sign in plain.both():
             yield Control(
                 fault=f"the gap of row {k} {sign * some:.3g} off at one sample",
-                run=plain.off("gap", (i, k), sign * some), sees={"gap_error": ((1.0 - SLACK) * PART, most)},
+                run=plain.off("gap", (i, k), sign * some), sees={"gap_error": ((1.0 - SLACK) * part, most)},
             )  # fmt: skip
             yield Control(
                 fault=f"the gap of row {k} {sign * every:.3g} off for some samples",
@@ -351,7 +352,7 @@ def _acts(case: Case, run: Trajectory, i: int, row: int) -> bool:
 
 
 def _pulling(plain: Plain) -> Iterator[Control]:
-    """Let rows that open pull, or push at nothing, at one sample."""
+    """Let rows that touch pull, or push at nothing, at one sample."""
     run, rows = plain.run, plain.normal
     most = PART * float(np.max(np.abs(run.lam[:, rows]), initial=0.0))
     wrong = {"pulls": (-most, np.isin(run.mode, PUSHES)), "pushes at nothing": (most, run.mode == Mode.FREE)}

@@ -78,6 +78,7 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
         trajectory=exact(sample_times(first, case.t_end)),
         at=exact,
         agreement={},
+        touches=case.law.touches,
         joined=case.general,
     )
     if "reference" not in engines.names() or not has_equations(case):
@@ -138,7 +139,7 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
     t, grown = _growing(case, dense, at, budget)
     truth = Truth(
         tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
-        grows=float(grown[-1]), joined=case.general,
+        grows=float(grown[-1]), touches=case.law.touches, joined=case.general,
     )  # fmt: skip
     truth = _held_against(truth, second, case, loose)
     if (horizon := _horizon(case, truth, second, t, grown)) is not None:

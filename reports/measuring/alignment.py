@@ -8,13 +8,15 @@ truth's instants; how far they were off is a number of its own (metric event_tim
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.contacts import Contact, contacts
+from crossbody.cases.contacts import Contact
+from crossbody.cases.defaults import shortest
 from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Mode, Trajectory
 
@@ -27,7 +29,7 @@ _Pairs = list[tuple[Contact, Contact]]
 def matched(truth: Truth, run: Trajectory) -> _Pairs:
     """Contacts of truth and run, paired in order up to the first of another row or not trusted."""
     pairs: _Pairs = []
-    for a, b in zip(*(contacts(each, truth.joined) for each in (truth.trajectory, run)), strict=False):
+    for a, b in zip(*map(truth.contacts, (truth.trajectory, run)), strict=False):
         if a.row != b.row or a.touch > truth.trusted:
             break
         pairs.append((a, b))
@@ -68,7 +70,11 @@ def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDAr
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run, releases)
     inside = _known(truth, t)
-    return inside, truth.at(t[inside])
+    exact, sides = truth.at(t[inside]), _sides(truth, run, t[inside])
+    if not np.array_equal(sides, exact.t):
+        jumps = truth.at(sides)
+        exact = replace(exact, lam=jumps.lam, mode=jumps.mode)
+    return inside, exact
 
 
 def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
@@ -76,7 +82,40 @@ def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
     for run in runs:
         for releases in (False, True):
             t = clock(truth, run, releases)
-            yield t[_known(truth, t)]
+            known = t[_known(truth, t)]
+            yield from (known, _sides(truth, run, known))
+
+
+def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
+    """Return the instants (n,) at which a truth tells what jumps: its own event where the run tells both sides of it.
+
+    That is one of the same row and mode which is as near as instants are judged to, with no other sample between:
+    between the two events one side alone would be beside both samples of the run, which counts for half a step of it.
+    """
+    theirs: dict[tuple[int, Mode], list[float]] = {}
+    for event in truth.trajectory.events:
+        theirs.setdefault((event.contact, event.after), []).append(event.t)
+    known, sides, moved = {event.t for event in truth.trajectory.events}, np.array(t), list[slice]()
+    for event in run.events:
+        first, last = (int(np.searchsorted(run.t[: len(t)], event.t, side=side)) for side in ("left", "right"))
+        if last - first < 2 or (here := float(t[first])) in known:
+            continue
+        times = np.array(theirs.get((event.contact, event.after), [np.inf]))
+        near = float(times[np.argmin(np.abs(times - here))])
+        if abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
+            sides[first:last] = near
+            moved.append(slice(first, last))
+    while wrong := [one for one in moved if _crosses(sides, one)]:
+        for one in wrong:
+            sides[one] = t[one]
+            moved.remove(one)
+    return sides
+
+
+def _crosses(t: Floats, one: slice) -> bool:
+    """Whether instants (n,) that are one are not behind the instant before them, or not before the one behind."""
+    before, behind = t[max(one.start - 1, 0) : one.start], t[one.stop : one.stop + 1]
+    return bool(np.any(before >= t[one.start]) or np.any(behind <= t[one.start]))
 
 
 def _known(truth: Truth, t: Floats) -> NDArray[np.bool_]:

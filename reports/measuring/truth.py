@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Chaos, Tier, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.between import between
+from crossbody.cases.contacts import Contact, contacts
 from crossbody.cases.trajectory import Ledger
 
 TRUTH = "truth"  # name of the truth where engines have theirs, and of the row that judges it
@@ -45,6 +46,7 @@ class Truth:
         short: why no further; empty if to the horizon.
         horizon: up to when a scene's motion can be known, and why no further, as measured; None
             if to the end.
+        touches (nc,): rows that begin and end contacts (`Law.touches`); None for all.
         joined: whether contacts of a row between which no gap opens are one: those of a scene,
             whose rows may depend on each other and rest unloaded.
     """
@@ -64,7 +66,12 @@ class Truth:
     part: float = 1.0
     short: str = ""
     horizon: Chaos | None = None
+    touches: NDArray[np.bool_] | None = None
     joined: bool = False
+
+    def contacts(self, run: Trajectory) -> tuple[Contact, ...]:
+        """Return the contacts of a run, or of this motion, as they are compared."""
+        return contacts(run, self.touches, self.joined)
 
 
 def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.contacts import CLOSED, Contact, contacts, rates
+from crossbody.cases.contacts import CLOSED, Contact, rates
 from crossbody.reports.measuring.alignment import aligned, matched
 from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import SLOW, guard, rubbing, turned
@@ -83,11 +83,11 @@ def _let_go(truth: Truth, a: Contact, b: Contact) -> float:
 def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Gaps against the truth's on matched arcs, over the largest of each row.
 
-    Max |gap - gap_truth| / max |gap_truth| over samples and unilateral rows, or over what the positions of the row's
-    bodies are measured by, as far as they move it; None without such a row. Where a discrete variable changes a gap may
+    Max |gap - gap_truth| / max |gap_truth| over samples and rows that touch, or over what the positions of the row's
+    bodies are measured by, as far as they move it; None without one. Where a discrete variable changes a gap may
     jump: those instants are left out.
     """
-    rows = case.law.unilateral
+    rows = case.law.touches
     inside, exact = aligned(truth, run)
     if not rows.any() or not inside.any():
         return None
@@ -208,9 +208,9 @@ def _opened(truth: Trajectory, a: Contact, b: Contact) -> float:
 def penetration(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Largest penetration.
 
-    max(0, -gap) over all unilateral rows and samples, m.
+    max(0, -gap) over all rows that touch and samples, m.
     """
-    rows = case.law.unilateral
+    rows = case.law.touches
     return float(np.max(-run.gap[:, rows], initial=0.0)) if rows.any() else None
 
 
@@ -219,7 +219,7 @@ def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None
 
     Max |min(gap, 0) - min(gap_truth, 0)| / max penetration of the truth; None where nothing penetrates.
     """
-    rows = case.law.unilateral
+    rows = case.law.touches
     deepest = float(np.max(-truth.trajectory.gap[:, rows], initial=0.0))
     if deepest <= SHALLOW * float(np.max(np.abs(truth.trajectory.gap), initial=0.0)):
         return None
@@ -234,13 +234,11 @@ def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None
 def release_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Contacts that ended in the run minus those of the truth: 0 if both release equally often.
 
-    Number of contacts of the run that ended minus the truth's; None without a row that can open.
+    Number of contacts of the run that ended minus the truth's; None without a row that touches.
     """
-    if not case.law.unilateral.any():
+    if not case.law.touches.any():
         return None
-    mine, theirs = (
-        sum(np.isfinite(c.release) for c in contacts(each, truth.joined)) for each in (run, truth.trajectory)
-    )
+    mine, theirs = (sum(np.isfinite(c.release) for c in truth.contacts(each)) for each in (run, truth.trajectory))
     return float(mine - theirs)
 
 
@@ -283,6 +281,8 @@ def _turned(truth: Truth, run: Trajectory, case: Case, slides: bool) -> float | 
 def touch_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Contacts of the run minus those of the truth: 0 if both touch equally often.
 
-    Number of contacts of the run minus the truth's.
+    Number of contacts of the run minus the truth's; None without a row that touches.
     """
-    return float(len(contacts(run, truth.joined)) - len(contacts(truth.trajectory, truth.joined)))
+    if not case.law.touches.any():
+        return None
+    return float(len(truth.contacts(run)) - len(truth.contacts(truth.trajectory)))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.impulse import away, cumulative, told, true_impulse, with_collisions
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
@@ -22,12 +21,10 @@ NEEDS = dict.fromkeys(("complementarity", "lam_error", "lam_impulse", "lam_impul
 def complementarity(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """How far the multipliers pull, or act where nothing touches, over the largest.
 
-    Max of -lam and of |lam| on open unilateral rows, over max |lam|; NaN where lam is not known. Rows that
-    follow others, those of friction, push either way. Recomputed from lam, gap and mode, never an engine's
-    own flag.
+    Max of -lam and of |lam| where they are open, of rows that touch, over max |lam|; NaN where lam is not known. Rows
+    of friction push either way. Recomputed from lam, gap and mode, never an engine's own flag.
     """
-    system = equations(case)
-    rows = case.law.unilateral & (True if system is None else np.asarray(system.follows) < 0)
+    rows = case.law.touches
     if not rows.any():
         return None
     if told(run) is None:

@@ -37,29 +37,30 @@ def contact_loss(run: Trajectory, case: Case) -> float | None:
 
 def contact_time(run: Trajectory, case: Case) -> float | None:
     """Duration of the first contact that ended, touch to release."""
-    return next((c.release - c.touch for c in contacts_of(run) if np.isfinite(c.release)), None)
+    return next((c.release - c.touch for c in contacts_of(run, case.law.touches) if np.isfinite(c.release)), None)
 
 
 def contacts(run: Trajectory, case: Case) -> float | None:
     """Number of contacts that begin."""
-    return float(len(contacts_of(run)))
+    return float(len(contacts_of(run, case.law.touches)))
 
 
 def energy_per_bounce(run: Trajectory, case: Case) -> float | None:
     """Energy gained from one release to the next, mean over all bounces."""
-    energy, ended = run.total_energy, [c.release for c in contacts_of(run) if np.isfinite(c.release)]
+    energy, ended = run.total_energy, [c.release for c in contacts_of(run, case.law.touches) if np.isfinite(c.release)]
     return (at(run, energy, ended[-1]) - float(energy[0])) / len(ended) if ended else None
 
 
 def fifth_exit(run: Trajectory, case: Case) -> float | None:
     """Instant of the fifth return to FREE; of the fifth release where the run has no modes."""
-    exits = [e.t for e in run.events if e.after == Mode.FREE] or [c.release for c in contacts_of(run)]
+    exits = [e.t for e in run.events if e.after == Mode.FREE] or [c.release for c in contacts_of(run, case.law.touches)]
     return exits[4] if len(exits) > 4 and np.isfinite(exits[4]) else None
 
 
 def final_gap(run: Trajectory, case: Case) -> float | None:
-    """Gap of the closest row at the end: zero where a body rests without penetration."""
-    return float(run.gap[-1].min())
+    """Gap of the closest row at the end, of those that have one: zero where a body rests without penetration."""
+    gaps = run.gap[-1, case.law.touches | ~case.law.unilateral]
+    return float(gaps.min()) if len(gaps) else None
 
 
 def final_lam(run: Trajectory, case: Case) -> float | None:
@@ -75,7 +76,7 @@ def restitution(run: Trajectory, case: Case) -> float | None:
 
 def separation_gap(run: Trajectory, case: Case) -> float | None:
     """Gap at the end of the first contact that ended; negative below the surface."""
-    ended = (c for c in contacts_of(run) if np.isfinite(c.release))
+    ended = (c for c in contacts_of(run, case.law.touches) if np.isfinite(c.release))
     return next((at(run, run.gap[:, c.row], c.release) for c in ended), None)
 
 

@@ -24,18 +24,18 @@ JOINS = 1e-6  # gap, m or rad (relative to positions above 1), that tolerances l
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max |gap| of unilateral rows at touches and at the end of BALLISTIC, over the row's longest way between samples.
+    """Max |gap| of rows that touch, at touches and at the end of BALLISTIC, over the row's longest way between samples.
 
     Where a row lets go its multiplier over its own longest way counts as well, and of both the smaller:
     laws without memory let go at the surface whatever pushes there. So does, of a contact that sticks, how
     far its friction is below its bound: where it reaches that, and would jam, its multiplier jumps to zero.
     Left out are those at whose instant something else happens, by which a multiplier may jump through zero,
     and a start in contact. Only what is beyond the errors of a row at its surface counts; where one touch is
-    located another may join that is as near as positions are known. None without rows that open, and where
+    located another may join that is as near as positions are known. None without rows that touch, and where
     gaps depend on discrete variables; NaN where an event has no instant.
     """
     system = equations(case)
-    if not case.law.unilateral.any() or len(run.t) < 2 or (system is not None and system.jumps):
+    if not case.law.touches.any() or len(run.t) < 2 or (system is not None and system.jumps):
         return None
     near, light = AT_REST * _size(run.q), LIGHT * _size(run.lam)
     alone, found = _alone(run, case, system), [0.0]
@@ -45,7 +45,7 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     }  # fmt: skip
     for event in run.events:
         row = event.contact
-        if not case.law.unilateral[row] or event.t <= run.t[0]:
+        if not case.law.touches[row] or event.t <= run.t[0]:
             continue
         joins = _touches(event) and event.t in located
         gap = _ways(run.t, run.gap[:, row], event.t, JOINS * _size(run.q) if joins else near)

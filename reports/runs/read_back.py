@@ -230,10 +230,10 @@ def _errors(found: Trace, first: Trace, result: CaseResult, judged: Sequence[Row
     truth, case = result.truth, result.case
     if found.truth is None or truth.trusted < truth.trajectory.t[-1] or truth.trajectory.switches:
         return
-    opens, scales = case.law.unilateral, np.array(first.about["gap_scales"])
+    touches, scales = case.law.touches, np.array(first.about["gap_scales"])
     gaps = np.abs(found.run.gap - found.truth.gap) / np.where(scales > 0.0, scales, 1.0)
     positions = differences(found.run.q, found.truth.q, case.quaternions) / np.array(first.about["scales"])
-    apart = {"position": positions, "gap_error": gaps[:, opens]}
+    apart = {"position": positions, "gap_error": gaps[:, touches]}
     known = ~np.isnan(found.truth.q).all(axis=1)
     for row in judged:
         if row["metric"] in apart and (row["engine"], row["profile"]) == (entry.engine, entry.profile):

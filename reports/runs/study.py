@@ -197,8 +197,8 @@ def traces(result: CaseResult) -> list[Trace]:
 
 
 def _gap_scales(truth: Truth, case: Case) -> list[float]:
-    """What the gap of every row that can open is measured by, m or rad; 0 of the others."""
-    rows = case.law.unilateral
+    """What the gap of every row that touches is measured by, m or rad; 0 of the others."""
+    rows = case.law.touches
     found = np.zeros(len(rows))
     if rows.any():
         found[rows] = gap_scale_of(truth, case, rows)

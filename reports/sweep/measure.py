@@ -11,7 +11,6 @@ import numpy as np
 from crossbody import engines
 from crossbody.cases import Case, CrossbodyError, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats, distinct
-from crossbody.cases.contacts import contacts
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.truth import Truth, from_run
@@ -104,7 +103,7 @@ def _exact(case: Case, times: Floats) -> Truth | str:
     motion = case.closed_form(times)
     if not motion.outcome.ok:
         return f"no truth: {motion.message}"
-    return replace(from_run(motion, Tier.A, "closed form"), at=case.closed_form)
+    return replace(from_run(motion, Tier.A, "closed form"), at=case.closed_form, touches=case.law.touches)
 
 
 def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Truth | str:
@@ -118,7 +117,7 @@ def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Tru
     ).run()
     if not other.outcome.ok:
         return f"no truth: the independent integrator ended with {other.outcome.value}"
-    return from_run(other, Tier.C, "compiled against CVODE")
+    return replace(from_run(other, Tier.C, "compiled against CVODE"), touches=case.law.touches)
 
 
 def _divergence(truth: Truth, times: Floats, asked: Asked, most: float, t_end: float) -> float:
@@ -165,7 +164,7 @@ def _against(truth: Truth, run: Trajectory, case: Case) -> Error:
     some and not by others.
     """
     truth, run = replace(truth, trajectory=lasting(truth.trajectory)), lasting(run)
-    if not (more := len(contacts(run)) - len(contacts(truth.trajectory))):
+    if not (more := len(truth.contacts(run)) - len(truth.contacts(truth.trajectory))):
         return _matched(truth, run, case)
     value = float(_apart(truth, run).max())
     return Error(value=value, tier=truth.tier.value, until=case.t_end, why=f"{more:+d} contacts, error {value:.2e}")

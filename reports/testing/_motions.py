@@ -11,7 +11,6 @@ import numpy as np
 
 from crossbody.cases import InvalidValue, Tier, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.contacts import contacts
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.truth import Truth, from_run
 
@@ -93,7 +92,7 @@ def assert_agrees(
     _check(mine, theirs.trajectory, of)
     fail_if_any(_unfinished(mine, theirs.trajectory))
     late = rtol * float(theirs.trajectory.t[-1]) if times is None else times
-    found = _touches(mine, theirs.trajectory, late)
+    found = _touches(mine, theirs, late)
     if not found:  # behind a touch that has no counterpart nothing can be compared
         found = [signal.offence() for signal in _signals(mine, theirs, of, rtol, atol)]
     fail_if_any(found)
@@ -123,9 +122,9 @@ def _unfinished(run: Trajectory, truth: Trajectory) -> list[str]:
     return []
 
 
-def _touches(run: Trajectory, truth: Trajectory, late: float) -> list[str]:
+def _touches(run: Trajectory, truth: Truth, late: float) -> list[str]:
     """The first touch that has no counterpart in row and time."""
-    mine, theirs = contacts(run), contacts(truth)
+    mine, theirs = truth.contacts(run), truth.contacts(truth.trajectory)
     for i, (a, b) in enumerate(zip(mine, theirs, strict=False)):
         if a.row != b.row or not abs(a.touch - b.touch) <= late:
             return [

@@ -121,18 +121,24 @@ def test_contacts_that_are_joined_are_what_the_row_bears_while_it_never_opens(se
         assert list(contacts(told(parts), joined=True)) == joined(parts), parts
 
 
-def test_a_row_without_a_gap_of_its_own_has_the_contacts_of_the_row_that_it_follows() -> None:
-    """None of its contacts is joined or left out by its gap, which is always zero."""
+@pytest.mark.parametrize("joined", [False, True])
+@pytest.mark.parametrize("told_too", [False, True])
+def test_a_row_of_friction_has_no_contacts_of_its_own(joined: bool, told_too: bool) -> None:
+    """Its gap is always zero, and engines may tell of it what the row does that it follows, or nothing."""
     for seed in range(50):
         one = told(story(np.random.default_rng(seed)))
         pair = {name: np.repeat(getattr(one, name), 2, axis=1) for name in ("gap", "lam", "mode")}
         pair["gap"][:, 1] = 0.0
-        if not pair["gap"].any():
-            continue
-        both = replace(one, **pair, events=tuple(replace(e, contact=row) for e in one.events for row in (0, 1)))
-        found = contacts(both, joined=True)
-        assert [c for c in found if c.row == 1] == [replace(c, row=1) for c in contacts(one)], seed
-        assert [c.touch for c in found] == sorted(c.touch for c in found)
+        rows = (0, 1) if told_too else (0,)
+        both = replace(one, **pair, events=tuple(replace(e, contact=row) for e in one.events for row in rows))
+        assert contacts(both, np.array([True, False]), joined) == contacts(one, joined=joined), seed
+
+
+def test_a_row_that_rests_has_a_contact_though_its_gap_is_never_other_than_zero() -> None:
+    """What touches is told by the law: by its gap a resting row is as one of friction."""
+    rests = told([FIRM, FIRM])
+    assert contacts(rests, np.array([True]), joined=True) == (Contact(0, 0.0),)
+    assert contacts(rests, np.array([False]), joined=True) == ()
 
 
 def test_a_row_that_is_always_on_is_no_contact() -> None:

@@ -39,7 +39,7 @@ def test_rows_that_others_hold_are_no_contacts_and_no_unknown_numbers(seed: int,
     assert found["complementarity"] < 1e-9
     assert found["law_residual"] is not None
     assert found["law_residual"] < 1e-7
-    met = {contact.row for contact in contacts(run, True)}
+    met = {contact.row for contact in contacts(run, joined=True)}
     assert all(case.law.unilateral[row] for row in met), "what is always on touches nothing"
     assert violated(case, run, RTOL) == ()
 

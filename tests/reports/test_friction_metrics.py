@@ -267,7 +267,7 @@ def test_what_sticks_to_a_belt_follows_the_law_over_the_belt(drift: float, monke
     run = simulate(system, [0.0, 0.0], [0.9 * drift, 0.0], 0.2, samples=np.linspace(0.0, 0.2, 101))
     assert (run.mode[:, 0] == Mode.STICK).any()
     law = replace(CASE.law, a0=system.a0, a1=system.a1, a2=np.zeros(2), b0=np.zeros(2), b1=np.zeros(2),
-                  unilateral=np.ones(2, dtype=np.bool_))  # fmt: skip
+                  unilateral=np.ones(2, dtype=np.bool_), touches=np.array([True, False]))  # fmt: skip
     for module in (friction, law_residual):
         monkeypatch.setattr(module, "equations", lambda case: system)
     case = replace(CASE, scene=None, law=law, inputs=None, contacts=("normal", "along"))

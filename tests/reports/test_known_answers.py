@@ -25,6 +25,7 @@ from crossbody.reports.judging import (
 )
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring import alignment
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.metrics import event_gap
 
@@ -77,6 +78,15 @@ def test_an_instant_that_stands_twice_is_read_before_what_happens(monkeypatch: p
     known_sides.wrong.cache_clear()
     try:
         assert {name for name, *_ in known_sides.wrong()} == {"event_gap"}
+    finally:
+        known_sides.wrong.cache_clear()
+
+
+def test_a_truth_that_is_asked_on_one_side_of_a_jump_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(alignment, "_sides", lambda truth, run, t: t)
+    known_sides.wrong.cache_clear()
+    try:
+        assert {name for name, *_ in known_sides.wrong()} == {"lam_impulse"}
     finally:
         known_sides.wrong.cache_clear()
 

@@ -122,7 +122,11 @@ def test_the_horizon_is_the_first_reason_of_all(seed: int) -> None:
             Event(t=b, contact=0, before=Mode.CONTACT, after=Mode.FREE),
         )]  # fmt: skip
         empty = engines.load("reference").prepare(case, "compiled").run()
-        return replace(empty, events=tuple(events), counts={"redundant": int(told)})
+        row = np.zeros((len(empty.t), 1))
+        return replace(
+            empty, events=tuple(events), counts={"redundant": int(told)}, gap=row, lam=row, mode=row.astype(np.int8),
+            ledger=None,
+        )  # fmt: skip
 
     until, parted = rng.choice([np.inf, 0.2]), rng.choice([np.inf, 0.9])
     first = replace(run(0.0), determined_until=float(until))

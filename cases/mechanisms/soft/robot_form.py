@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -181,7 +181,7 @@ def on_robot(case: Case, powered: bool = True, steady: bool = False) -> Form:
         far=(1.0,) * HINGES + (far, far, force * time, *(far,) * 3, *(far * time,) * 3),
         fast=(1.0 / time,) * HINGES + (far / time, far / time, force, *(far / time,) * 3, *(far,) * 3),
     )  # fmt: skip
-    laws = {name: getattr(case.law, name)[order] for name in ("a0", "a1", "a2", "b0", "b1", "unilateral")}
+    laws = {part.name: getattr(case.law, part.name)[order] for part in fields(Law)}
     start = to_scene(case.q0, case.v0)
     return Form(
         case=formed(case, _scene(p), *start, law=Law(**laws), force=acting),

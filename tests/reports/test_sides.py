@@ -1,0 +1,104 @@
+"""Where an instant of a run stands twice, and the truth's own event is near, each side is beside its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crossbody import cases
+from crossbody.cases import Event, Mode, Tier, Trajectory
+from crossbody.cases.defaults import shortest
+from crossbody.reports import metrics
+from crossbody.reports.measuring.alignment import aligned, instants
+from crossbody.reports.measuring.truth import Truth, from_run, sample_times
+
+CASE = cases.load("sliding_block", "turns")
+assert CASE.closed_form is not None
+EVENTS = CASE.closed_form(np.zeros(1)).events
+TURN = EVENTS[-1].t
+TRUTH = replace(
+    from_run(CASE.closed_form(sample_times(CASE.closed_form(np.zeros(1)), CASE.t_end)), Tier.A, "closed form"),
+    at=CASE.closed_form, touches=CASE.law.touches, joined=True,
+)  # fmt: skip
+
+
+def turned(off: float, times: np.ndarray) -> Trajectory:
+    """The exact motion at these instants, s, and on both sides of where it turns, which is told as later by `off`."""
+    assert CASE.closed_form is not None
+    t = np.sort(np.concatenate([times, [TURN + off] * 2]))
+    run = CASE.closed_form(np.maximum.accumulate(np.where(t == TURN + off, TURN, t)))
+    return replace(run, t=t, events=(*EVENTS[:-1], replace(EVENTS[-1], t=TURN + off)))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_jumps_is_beside_a_run_on_both_sides(seed: int) -> None:
+    """However near an event is, below what instants are judged to, and whatever the steps: impulses are the same."""
+    draw = np.random.default_rng(seed)
+    off = draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-16.0, np.log10(shortest(CASE.t_end)))
+    apart = draw.uniform(0.0, CASE.t_end, draw.integers(5, 100))
+    times = np.concatenate([[0.0, CASE.t_end], apart[np.abs(apart - TURN) > 1e-5]])
+    run = turned(off, times)
+    inside, exact = aligned(TRUTH, run)
+    assert inside.all()
+    np.testing.assert_allclose(exact.lam, run.lam, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(exact.mode, run.mode)
+    np.testing.assert_array_equal(exact.t, run.t)
+    assert metrics.load("lam_impulse").measure(TRUTH, run, CASE) < 1e-9
+    known = [list(asked) for asked in instants(TRUTH, [run])]
+    assert all(list(each) in known for each in asked_for(TRUTH, run))
+
+
+def asked_for(truth: Truth, run: Trajectory) -> list[np.ndarray]:
+    """The instants at which a truth is asked for a run."""
+    asked = []
+    assert CASE.closed_form is not None
+    of = CASE.closed_form
+
+    def at(t: np.ndarray) -> Trajectory:
+        asked.append(t)
+        return of(t)
+
+    aligned(replace(truth, at=at), replace(run))
+    return asked
+
+
+def test_what_is_farther_than_instants_are_judged_to_is_where_it_is() -> None:
+    """Between the two events both samples of the run are before, or behind, the truth's."""
+    off = 3.0 * shortest(CASE.t_end)
+    for late in (off, -off):
+        _, exact = aligned(TRUTH, turned(late, np.linspace(0.0, CASE.t_end, 50)))
+        at = np.flatnonzero(exact.t == TURN + late)
+        assert np.ptp(exact.lam[at], axis=0).max() == 0.0
+
+
+def test_samples_between_two_events_part_them() -> None:
+    """A run that has a sample between its event and the truth's tells there what it has: nothing is moved past it."""
+    off = 0.5 * shortest(CASE.t_end)
+    _, exact = aligned(TRUTH, turned(off, np.array([0.0, TURN + 0.5 * off, CASE.t_end])))
+    assert np.ptp(exact.lam[exact.t == TURN + off], axis=0).max() == 0.0
+
+
+def pushed(at: np.ndarray, t: np.ndarray) -> Trajectory:
+    """Rows that push with 1 N each from instants (n,) on, s, and slip then; told at times t, and on both sides."""
+    t = np.sort(np.concatenate([t, *[at, at]]))
+    again = np.append(False, t[1:] == t[:-1])
+    on = (t[:, None] > at) | ((t[:, None] == at) & again[:, None])
+    rest = np.ones((len(t), 1))
+    return Trajectory(
+        t=t, q=rest, v=rest, gap=0.0 * on, lam=on.astype(float), energy=np.hstack([rest, rest]),
+        mode=np.where(on, Mode.SLIP, Mode.STICK).astype(np.int8),
+        events=tuple(Event(t=x, contact=row, before=Mode.STICK, after=Mode.SLIP) for row, x in enumerate(at.tolist())),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_jumps_of_several_rows_that_are_nearer_to_each_other_than_a_run_is_to_its_truth(seed: int) -> None:
+    """Each is beside its own."""
+    draw = np.random.default_rng(seed)
+    at = 0.5 + np.cumsum(draw.uniform(1e-9, 1e-8, 3))
+    late, t = draw.choice([-1.0, 1.0]) * draw.uniform(1e-9, 1e-7), np.array([0.0, *draw.uniform(0.0, 0.4, 5), 1.0])
+    truth = from_run(pushed(at, np.sort(np.append(t, 0.9))), Tier.A, "made up")
+    run = pushed(at + late, np.sort(t))
+    np.testing.assert_array_equal(aligned(truth, run)[1].lam, run.lam)
