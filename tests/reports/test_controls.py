@@ -16,7 +16,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Claim, Limit, Mode, Tier
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reports import metrics
-from crossbody.reports.judging import audit, comparison, controls, judge_controls, planted, run_verdicts, verdict
+from crossbody.reports.judging import audit, comparison, controls, judge_controls, known, planted, run_verdicts, verdict
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.controls import unheard
 from crossbody.reports.judging.reach import followed
@@ -34,6 +34,12 @@ LABELS = (
 )  # fmt: skip
 BALL = cases.load("bouncing_ball", "elastic")
 TRUTH = truth_of(BALL)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _known_before() -> None:
+    """Ask for the known answers, which are asked once a process, while no metric is another one."""
+    assert [*known.wrong()] == []
 
 
 def blind(case: Case, truth: Truth) -> list[Verdict]:
