@@ -12,7 +12,7 @@ from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import called, label, style
-from crossbody.reports.judging.told import beyond, share
+from crossbody.reports.judging.told import beyond, telling
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.friction import friction, hysteresis
@@ -117,11 +117,9 @@ def _truths(about: Mapping[str, Any]) -> str:
     return f"{tier[:1]}: {tier}" if figures.of_log(about) else ", ".join(Tier)
 
 
-def _far(row: Row) -> tuple[int, float]:
-    """The worst word first, and of one word what is farthest out."""
-    word = row["verdict"]
-    known = word in grid.WORST or beyond(row)
-    return (grid.RANKED.index(word), -share(row)) if known else (len(grid.RANKED), 0.0)
+def _far(row: Row) -> tuple[Any, ...]:
+    """The worst word first, and of one word what tells most."""
+    return grid.RANKED.index(row["verdict"]) if grid.held(row) else len(grid.RANKED), *telling(row)
 
 
 def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[Section]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import WRONG, beyond, runs_of, share
+from crossbody.reports.judging.told import FINISHED, WRONG, beyond, runs_of, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
 from crossbody.reports.pages.html import number
@@ -173,19 +173,24 @@ def _cost(wall: float | None, least: float) -> Cell:
 
 def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
     judged = list(filter(held, rows))
-    far: dict[str, float] = {}
-    for row in judged:
-        far[row["metric"]] = max(far.get(row["metric"], 0.0), share(row))
-    far |= {name: far.get("position", 0.0) for name in SHARES}
+    first = {metric: min(map(_urgent, those)) for metric, those in by(judged, "metric").items()}
+    if "position" in first:
+        first |= dict.fromkeys(SHARES, first["position"])
     judged += [row for row in rows if judged and row["metric"] in SHARES]
     units = {row["metric"]: unit_text(row["unit"], "[{}]") for row in judged or rows}
-    first = [name for name in KEY if name in units]
-    order = sorted(units, key=lambda name: (-far.get(name, 0.0), first.index(name) if name in first else len(first)))
+    key = [name for name in KEY if name in units]
+    order = sorted(units, key=lambda name: (first.get(name, ()), key.index(name) if name in key else len(key)))
     values = {who: {row["metric"]: row for row in mine[who]} for who in engines}
     return [
         Line(text=name, small=units[name], cells=[_value(values[who].get(name), page) for who in engines])
         for name in order
     ]
+
+
+def _urgent(row: Row) -> tuple[Any, ...]:
+    """Sort runs that did not finish first, then what is beyond its limit; of each what tells most."""
+    failed = row["metric"] == FINISHED and row["verdict"] in WRONG
+    return not failed, not share(row) > 1.0, *telling(row)
 
 
 def _value(row: Row | None, page: str) -> Cell:

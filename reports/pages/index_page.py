@@ -13,7 +13,7 @@ import numpy as np
 from crossbody.cases import installed
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import look
-from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share
+from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
@@ -143,10 +143,10 @@ def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
 
 
 def _worst(found: Results, case: CaseFiles) -> str:
-    """The number of the worst word that is farthest out, in a few words; one without a limit only if it is wrong."""
+    """The number of the worst word that tells most, in a few words; one without a limit only if it is wrong."""
     held = [row for row in found.rows.get(case.label, ()) if grid.held(row) and share(row) > 0.0]
     known = [row for row in held if row["verdict"] in WRONG or math.isfinite(share(row))]
-    row = max(known, key=lambda row: (-grid.RANKED.index(row["verdict"]), share(row)), default=None)
+    row = min(known, key=lambda row: (grid.RANKED.index(row["verdict"]), *telling(row)), default=None)
     return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}" if row else ""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -28,7 +29,7 @@ from crossbody.reports.figures.section import Kind, Plot, Section, Table, column
 from crossbody.reports.figures.styles import COLOURS, DASHES, style
 from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.run_verdicts import Entry
-from crossbody.reports.judging.told import share
+from crossbody.reports.judging.told import QUANTITIES, share
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
@@ -384,22 +385,30 @@ def test_the_index_counts_what_is_beyond_a_limit_though_it_is_not_judged(
     assert told == ([str(loose)] if loose else [])
 
 
-def test_what_is_farthest_out_stands_first(out: Path) -> None:
-    text = (out / CASE).read_text().replace("<wbr>", "")
-    body = text[text.index('--glance">') :]
-    shown = re.findall(r'<th scope="row">(\w+)', body[body.index("<tbody>") : body.index("</tbody>")])
-    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["verdict"] in grid.WORST]
-    far = {row["metric"]: max(share(each) for each in rows if each["metric"] == row["metric"]) for row in rows}
-    order = [far[name] for name in shown if name in far]
-    assert len(order) > 10
-    assert order == sorted(order, reverse=True)
+@pytest.mark.parametrize("seed", range(30))
+def test_quantities_beyond_their_limits_stand_before_identities_and_counts(seed: int) -> None:
+    """A count that must be exact is no multiple of a limit: it says less than a position that is far off."""
+    rng = np.random.default_rng(seed)
+    tells = {"position": 0, "velocity": 1, "event_times": 1, "law_residual": 2, "rate_residual": 2, "touch_count": 3}
+    times = {str(name): math.inf if name == "touch_count" else 10.0 ** rng.uniform(-3.0, 9.0)
+             for name in rng.permutation(list(tells))}  # fmt: skip
+    rows = [
+        Verdict(
+            case="c", variant="v", engine="e", profile="p", metric=name, value=min(size, 1e9), unit="1",
+            limit=0.0 if size == math.inf else 1.0, tier="A", verdict=Word.EXPECTED if size > 1.0 else Word.WITHIN,
+        ).row() | {"who": "e:p"} for name, size in times.items()
+    ]  # fmt: skip
+    shown = [line.text for line in grid.of_case(rows, "page", "c:v", {})[2:]]
+    assert shown == sorted(times, key=lambda name: (times[name] < 1.0, tells[name], -times[name]))
 
 
-def test_the_index_names_the_number_of_a_case_that_is_farthest_out_of_those_of_the_worst_word(out: Path) -> None:
+def test_the_index_names_the_number_of_a_case_that_tells_most_of_those_of_the_worst_word(out: Path) -> None:
     text = (out / "index.html").read_text().replace("<wbr>", "")
     rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if grid.held(row)]
     worst = min(grid.RANKED.index(row["verdict"]) for row in rows)
-    far = max((row for row in rows if grid.RANKED.index(row["verdict"]) == worst), key=share)
+    of_worst = [row for row in rows if grid.RANKED.index(row["verdict"]) == worst and share(row) > 0.0]
+    far = max(of_worst, key=lambda row: (row["metric"] == "position", row["metric"] in QUANTITIES,
+                                         share(row) < math.inf, share(row)))  # fmt: skip
     named = escape(f"{far['engine']}:{far['profile']}: {far['metric']} {grid.short(far['value'])}")
     assert f"<small>{named}</small>" in text
 
