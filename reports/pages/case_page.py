@@ -128,7 +128,7 @@ def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[S
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
     drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES}
     return [
-        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces), plots=plots)
+        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces, limits), plots=plots)
         for name, plots in drawn.items() if plots
     ]  # fmt: skip
 

@@ -234,7 +234,7 @@ def test_a_plane_that_a_body_carries_is_where_the_body_is(solids: Path, browser:
 
 
 EDGE = (
-"(() => { const c = document.querySelector('.player canvas'); const g = c.getContext('2d');"
+    "(() => { const c = document.querySelector('.player canvas'); const g = c.getContext('2d');"
     " const seen = new Set();"
     " for (const [x, y, w, h] of [[0, 0, c.width, 1], [0, c.height - 1, c.width, 1], [0, 0, 1, c.height],"
     " [c.width - 1, 0, 1, c.height]])"

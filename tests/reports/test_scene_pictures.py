@@ -217,8 +217,9 @@ def test_no_body_is_drawn_as_nothing(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(10))
 def test_what_a_box_of_its_body_holds_is_not_drawn_and_all_else_is(seed: int) -> None:
     draw = np.random.default_rng(seed)
+    turn = tuple(Rotation.random(rng=draw).as_quat())
     box = Shape(name="box", body="ball", type="box", size=tuple(draw.uniform(0.2, 0.4, 3)),
-                position=tuple(draw.normal(size=3)), orientation=tuple(Rotation.random(rng=draw).as_quat()))  # fmt: skip
+                position=tuple(draw.normal(size=3)), orientation=turn)  # fmt: skip
     ways = np.array([box.orientation[k] for k in (1, 2, 3, 0)])
     held, out = (
         Shape(name=name, body="ball", size=(0.05, 0.0, 0.0), position=tuple(

@@ -54,7 +54,7 @@ def block(name: str, half: Vector, mass: float = MASS, height: float = 0.0) -> B
 
 
 def touching_block(radius: float) -> tuple[Shape, Shape]:
-    """Return the ball by which a block that never turns touches at one place, and the box that is seen, with no pair."""
+    """Return the ball by which a block that never turns touches at one place, and the box that is seen."""
     sides = (2.0 * radius, 1.5 * radius, radius)
     ball = Shape(name="block", body="block", size=(radius, 0.0, 0.0))
     return ball, Shape(name="box", body="block", type="box", size=sides)
