@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, SPLIT, part_of
-from crossbody.reports.judging.verdict import IDENTITIES, Row, Word
+from crossbody.reports.judging.verdict import IDENTITIES, LACKS, Row, Word
 from crossbody.reports.layout import unit_text, valid
 from crossbody.reports.measuring.truth import TRUTH
 
@@ -97,6 +97,15 @@ def share(row: Row) -> float:
     if off == 0.0:
         return 0.0
     return off / limit if limit > 0.0 and math.isfinite(off) else math.inf
+
+
+def lacking(row: Row) -> str:
+    """Say in few words why a row has no number."""
+    if row["verdict"] == Word.SKIPPED:
+        return "not run"
+    if row["verdict"] == Word.INFO and not row["why"].startswith(LACKS):
+        return "not measured"
+    return "no such event" if row["metric"].endswith("_times") else "no number"
 
 
 def farthest(row: Row) -> tuple[bool, bool, float]:

@@ -12,7 +12,7 @@ from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import called, label, style
-from crossbody.reports.judging.told import beyond, telling
+from crossbody.reports.judging.told import beyond, lacking, telling
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.friction import friction, hysteresis
@@ -103,7 +103,7 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": [row | {"beyond": beyond(row)} for row in rows],
+            "rows": [row | {"beyond": beyond(row), "lacking": lacking(row)} for row in rows],
             "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
             "truths": _truths(case.about), "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),

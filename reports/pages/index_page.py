@@ -18,7 +18,7 @@ from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
-from crossbody.reports.pages.html import Page
+from crossbody.reports.pages.html import BEYOND, Page
 from crossbody.reports.pages.precision import overview
 from crossbody.reports.pages.results import CaseFiles, Results
 from crossbody.reports.pages.summary import deviations, engines
@@ -178,7 +178,7 @@ def _tiles(found: Results) -> dict[str, Any]:
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if loose:
-        tiles.append({"value": loose, "title": "beyond a limit, not judged", "word": Word.INFO.value})
+        tiles.append({"value": loose, "title": "beyond a limit, not judged", "word": BEYOND})
     if failed:
         tiles.append({"value": failed, "title": "failed parity audits", "word": Word.OUTSIDE.value})
     return {"tiles": tiles, "warnings": [text for text in (_version(found),) if text]}

@@ -31,7 +31,7 @@ from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.told import QUANTITIES, share
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.verdict import Row, Verdict, Word
+from crossbody.reports.judging.verdict import LACKS, Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import KeptTemplates, Page, plot
@@ -682,3 +682,57 @@ def test_a_name_that_may_break_is_the_same_name(seed: int) -> None:
     shown = html.breakable(name)
     assert unescape(shown.replace("<wbr>", "")) == name
     assert shown.count("<wbr>") == name.count(":") + name.count("_")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "metric", "why", "said"),
+    [
+        (Word.INFO, "event_times", f"{LACKS} Known: soft.", "no such event"),
+        (Word.INFO, "position", f"{LACKS} Known: soft.", "no number"),
+        (Word.INFO, "position", "Not measured. It would take 55 s.", "not measured"),
+        (Word.EXPECTED, "mode_times", "There is no contact phase.", "no such event"),
+        (Word.OUTSIDE, "velocity", "The value is not finite.", "no number"),
+    ],
+)  # fmt: skip
+def test_a_cell_without_a_number_says_why(verdict: Word, metric: str, why: str, said: str) -> None:
+    def told(metric: str, value: float, who: str, word: Word, why: str) -> Row:
+        engine, _, profile = who.partition(":")
+        return Verdict(case="c", variant="v", engine=engine, profile=profile, metric=metric, value=value, unit="1",
+                       limit=1.0, tier="A", verdict=word, why=why).row() | {"who": who}  # fmt: skip
+
+    rows = [told(metric, math.nan, "a:p", verdict, why), told(metric, 0.5, "b:p", Word.WITHIN, ""),
+            told("own", 0.5, "b:p", Word.WITHIN, ""), told("run", math.nan, "c:p", Word.SKIPPED, "absent")]  # fmt: skip
+    lines = {line.text: [cell.told for cell in line.cells] for line in grid.of_case(rows, "page", "c:v", {"a:p": 1.0})}
+    assert lines[metric] == [said, ""]
+    assert lines["own"] == ["none", ""]
+    assert lines["run time"] == ["", "none"]
+    assert grid.whole("c:v", "page", "c:p", rows[3:], None).told == "not run"
+    assert grid.whole("c:v", "page", "d:p", [], None).told == "not selected"
+    assert html.number(None) == html.number(math.nan) == "none"
+
+
+def test_what_is_the_same_in_every_row_is_said_once_above_the_table() -> None:
+    shown = Table(
+        title="T", columns=columns(case="Case", who="Engine", x=("X", Kind.NUMBER), empty="Empty"),
+        rows=[{"case": "ball:hard", "who": who, "x": 1.0, "empty": ""} for who in ("a:p", "b:p")],
+    )  # fmt: skip
+    assert html.same(shown) == {"Case": "ball:hard"}
+    assert [column.title for column in html.told(shown)] == ["Engine", "X"]
+    alone = replace(shown, rows=shown.rows[:1])
+    assert html.same(alone) == {}
+    assert [column.title for column in html.told(alone)] == ["Case", "Engine", "X"]
+
+
+def test_a_run_far_beyond_a_limit_that_is_not_judged_is_seen_to_be(tmp_path: Path, result: CaseResult) -> None:
+    """It was a grey dot beside ticks."""
+    rows = study.judge([result], {result.case.label: "crossbody run"})
+    rows = [row | {"verdict": Word.WITHIN.value, "value": 0.0, "expected": math.nan, "limit": 1.0} for row in rows]
+    rows = [row | {"verdict": Word.INFO.value, "value": 6e5} if row["metric"] == "position" else row for row in rows]
+    out = made(tmp_path / "out", [result], rows)
+    index, (page,) = (out / "index.html").read_text(), [path.read_text() for path in out.glob("case-*.html")]
+    assert re.search(r'class="cell beyond-not-judged heat-5".*?▲</span>.*? 1 beyond, not judged<', index)
+    assert re.search(
+        r'class="word beyond-not-judged"><span aria-hidden="true">▲</span> <span class="said">beyond', index
+    )
+    assert '<tr data-verdict="not judged" data-beyond' in page
+    assert '▲</span> <span class="said">beyond, not judged' in page

@@ -618,3 +618,24 @@ def test_one_goes_from_case_to_case_and_back_to_the_sections(tmp_path: Path, bro
     browser.js("document.querySelector('.engines a').click()")
     browser.wait("document.querySelector('.inside').getBoundingClientRect().top >= 0 && scrollY < 300")
     assert browser.complaints() == []
+
+
+def test_timings_and_names_of_rungs_are_read_on_a_narrow_screen(whole: Path, browser: chromium.Browser) -> None:
+    """Engine, setting, error and time stand beside each other; what goes on to the right can be scrolled to."""
+    (page,) = [path for path in whole.glob("*.html") if "Timings" in path.read_text()][:1]
+    browser.open(page, width=400)
+    draw_all(browser)
+    seen = browser.js(
+        "(() => { const table = [...document.querySelectorAll('details.table')].find((one) =>"
+        " one.querySelector('summary').textContent.startsWith('Timings'));"
+        " const end = table.querySelector('.scroll').getBoundingClientRect().right;"
+        " return [...table.querySelectorAll('th')].filter((head) => head.getBoundingClientRect().right <= end)"
+        ".map((head) => head.textContent); })()"
+    )
+    assert {"Engine", "Value", "Error", "Median [ms]"} <= set(seen)
+    rungs = browser.js(
+        "[...document.querySelectorAll('.plot .textpoint text')].map((text) =>"
+        " [text.textContent, parseFloat(getComputedStyle(text).fontSize), text.getBoundingClientRect().toJSON()])"
+    )
+    assert len(rungs) > 3
+    assert min(size for _, size, _ in rungs) >= 11.0
