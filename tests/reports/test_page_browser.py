@@ -621,7 +621,7 @@ def test_one_goes_from_case_to_case_and_back_to_the_sections(tmp_path: Path, bro
 
 
 def test_timings_and_names_of_rungs_are_read_on_a_narrow_screen(whole: Path, browser: chromium.Browser) -> None:
-    """Engine, setting, error and time stand beside each other; what goes on to the right can be scrolled to."""
+    """Setting, error and time stand beside each other; what goes on to the right can be scrolled to."""
     (page,) = [path for path in whole.glob("*.html") if "Timings" in path.read_text()][:1]
     browser.open(page, width=400)
     draw_all(browser)
@@ -632,7 +632,7 @@ def test_timings_and_names_of_rungs_are_read_on_a_narrow_screen(whole: Path, bro
         " return [...table.querySelectorAll('th')].filter((head) => head.getBoundingClientRect().right <= end)"
         ".map((head) => head.textContent); })()"
     )
-    assert {"Engine", "Value", "Error", "Median [ms]"} <= set(seen)
+    assert {"Value", "Error", "Median [ms]"} <= set(seen)
     rungs = browser.js(
         "[...document.querySelectorAll('.plot .textpoint text')].map((text) =>"
         " [text.textContent, parseFloat(getComputedStyle(text).fontSize), text.getBoundingClientRect().toJSON()])"
