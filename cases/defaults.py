@@ -139,6 +139,8 @@ TOGETHER = (
     "collisions overlap, not one collision after another."
 )
 
+FIXED_STEP = "Generalised-alpha at fixed steps, inside of which contacts begin and end."
+
 _BALL: dict[tuple[str, str], str] = {
     ("exudyn", "matched"): MEMORYLESS, ("exudyn", "default"): SPRINGS, ("drake", "matched"): MEMORYLESS,
     ("drake", "continuous"): PLANT, ("drake", "default"): DISCRETE, ("dart", "matched"): IMPACT,
@@ -148,6 +150,7 @@ _SLIDERS: dict[tuple[str, str], str] = _BALL | {
     ("exudyn", "matched"): TOGETHER, ("exudyn", "default"): TOGETHER, ("drake", "matched"): TOGETHER,
     ("drake", "continuous"): TOGETHER,
 }  # fmt: skip
+_APART = {("exudyn", "default"): FIXED_STEP}
 _LAW = (("exudyn", "matched"), ("drake", "matched"))  # the profiles to which the law's constants are given
 
 # How far each of these takes an engine at the default parameters: about twice what was measured over the variants
@@ -230,9 +233,9 @@ def ball(wanted: Mapping[str, tuple[float, str]], bilateral: bool) -> Iterator[L
             yield from _limits(engine, profile, known, wanted, _BALL_SIZES.get((engine, profile), {}))
 
 
-def sliders(wanted: Mapping[str, tuple[float, str]]) -> Iterator[Limit]:
-    """The limits of a cradle's sliders."""
-    for (engine, profile), known in _SLIDERS.items():
+def sliders(wanted: Mapping[str, tuple[float, str]], apart: bool) -> Iterator[Limit]:
+    """The limits of a cradle's sliders, which collide one after another where they start apart."""
+    for (engine, profile), known in (_SLIDERS | (_APART if apart else {})).items():
         yield from _limits(engine, profile, known, wanted, _SLIDER_SIZES.get((engine, profile), {}))
 
 

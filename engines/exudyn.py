@@ -78,7 +78,7 @@ def _connector(mbs: Any, scene: Line, row: int, markers: list[Any], symbolic: bo
     m, stopped = float(scene.reduced[row]), [0.0, 0.0, 0.0]
     memory = mbs.AddNode(items.NodeGenericData(initialCoordinates=stopped, numberOfDataCoordinates=len(stopped)))
     return items.CoordinateSpringDamperExt(
-        markerNumbers=markers, nodeNumber=memory, offset=offset, useLimitStops=True, limitStopsLower=0.0,
+        markerNumbers=markers, nodeNumber=memory, offset=offset, useLimitStops=True, limitStopsLower=offset,
         limitStopsUpper=FAR, limitStopsStiffness=m * scene.a0[row], limitStopsDamping=m * scene.a1[row],
     )  # fmt: skip
 
@@ -114,12 +114,24 @@ def _build(scene: Line, symbolic: bool) -> Model:
     return Model(mbs=mbs, held=(container, *laws), sensors=(q, v, lam), masses=masses, laws=laws, rows=rows)
 
 
-def _springs(model: Model) -> dict[str, str]:
-    """Return stiffness, N/m, and damping, N s/m, of the connectors, read back; each of them once."""
-    read = model.mbs.GetObject
-    names = ("limitStopsStiffness", "limitStopsDamping"), ("stiffness", "damping")
-    found = {tuple(read(row).get(one, read(row)[two]) for one, two in zip(*names, strict=True)) for row in model.rows}
-    return {"springs": ",".join("/".join(f"{x:.6g}" for x in one) for one in sorted(found))}
+def _springs(model: Model) -> Floats:
+    """Return stiffness, N/m, and damping, N s/m, of every connector (2, nc), read back."""
+    read = [model.mbs.GetObject(row) for row in model.rows]
+    names = ("limitStopsStiffness", "stiffness"), ("limitStopsDamping", "damping")
+    return np.array([[row.get(stop, row[spring]) for row in read] for stop, spring in names])
+
+
+def _said(springs: Floats) -> str:
+    """Return the connectors that differ, each once."""
+    return ",".join("/".join(f"{x:.6g}" for x in one) for one in sorted(set(map(tuple, springs.T.tolist()))))
+
+
+def _constants(scene: Line, model: Model) -> dict[str, Floats]:
+    """Return a0, a1 and a2 (nc,) of every row by what was built: a spring and a damper have no cubic term."""
+    if model.laws:
+        return {"a0": scene.a0, "a1": scene.a1, "a2": scene.a2}
+    a0, a1 = _springs(model) * (scene.H**2 @ (1.0 / np.array(model.masses)))
+    return {"a0": a0, "a1": a1, "a2": 0.0 * a0}
 
 
 def _simulation(case: Case, used: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -195,8 +207,7 @@ def _audit(case: Case, scene: Line, model: Model) -> Mapping[str, Any]:
     """What was put in, and the law as Exudyn evaluates it."""
     found: dict[str, Any] = {
         "masses": model.masses, "gravity": scene.gravity, "q0": case.q0, "v0": case.v0,
-        "constants": {"a0": scene.a0, "a1": scene.a1, "a2": scene.a2} if model.laws
-        else {"stiffness": scene.reduced * scene.a0, "damping": scene.reduced * scene.a1},  # which know no law
+        "constants": _constants(scene, model),
     }  # fmt: skip
 
     def lam(q: Floats, v: Floats) -> Floats:
@@ -238,7 +249,11 @@ class Exudyn(Engine):
         used = _settings.chosen(self.name, profile, _known(case, profile), settings)
         scene = line(case)
         model = _build(scene, symbolic=profile == "matched")
-        extra = {"law": law_name(scene)} if profile == "matched" else {"method": "GeneralizedAlpha", **_springs(model)}
+        extra = (
+            {"law": law_name(scene)}
+            if profile == "matched"
+            else {"method": "GeneralizedAlpha", "springs": _said(_springs(model))}
+        )
         return PeerRun(
             engine=self.name, profile=profile, settings=used | extra,
             integrate=_integrator(case, scene, model, used), physics=_audit(case, scene, model),

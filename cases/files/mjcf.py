@@ -11,7 +11,9 @@ import numpy as np
 from crossbody.cases.errors import SceneError
 from crossbody.cases.files.meshes import check_files, leave_out_colliding, leave_out_missing
 from crossbody.cases.files.pairs import pairs_of
+from crossbody.cases.files.reading import is_urdf
 from crossbody.cases.files.understood import check_understood
+from crossbody.cases.files.urdf import unfused
 from crossbody.cases.files.warned import compiled, sentences
 from crossbody.cases.files.without import apart, without_meshes
 from crossbody.cases.scene import (
@@ -49,7 +51,7 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     told: list[str] = []
 
     def opened() -> Any:
-        spec = mujoco.MjSpec.from_file(str(path))
+        spec = unfused(path) if is_urdf(path) else mujoco.MjSpec.from_file(str(path))
         if without_meshes(without):
             leave_out_colliding(spec)
         return spec

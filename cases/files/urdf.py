@@ -77,16 +77,34 @@ def read(path: Path, without: str = "") -> tuple[mujoco.MjModel, list[str]]:
     return model, sentences(warned)
 
 
-def _float(root: ElementTree.Element) -> None:
+def unfused(path: Path) -> Any:
+    """Return MuJoCo's own specification of a URDF, with a body for every link.
+
+    By itself its compiler merges links with what they are fixed to (fusestatic): what the world bears would lose its
+    mass, the energy its share, and bodies their numbers. Floating joints hang on the world, where else it refuses them.
+    """
+    import mujoco
+
+    root = parsed(path)
+    if _float(root):
+        text = ElementTree.tostring(root, encoding="unicode")
+        spec = mujoco.MjSpec.from_string(text, assets=supplied(root, path))
+    else:
+        spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.fusestatic = False
+    return spec
+
+
+def _float(root: ElementTree.Element) -> bool:
     """Let floating joints hang on the world itself, which the root is called then: the compiler knows none elsewhere.
 
-    The root stands on the world anyway, and is no body of the scene then.
+    Return whether there are any. The root stands on the world anyway, and is no body of the scene then.
     """
     floating = [joint for joint in root.findall("joint") if joint.get("type") == "floating"]
     above = {_link(joint, "child"): joint for joint in root.findall("joint")}
     ground = next((link for link in root.findall("link") if link.get("name") not in above), None)
     if not floating or ground is None:
-        return
+        return False
     for joint in floating:
         p, R, on, passed = *_origin(joint), _link(joint, "parent"), {joint}
         while on in above and above[on] not in passed:
@@ -107,6 +125,7 @@ def _float(root: ElementTree.Element) -> None:
     for parent in root.findall("joint/parent"):
         if parent.get("link") == name:
             parent.set("link", "world")
+    return True
 
 
 def _link(joint: ElementTree.Element, side: str) -> str:

@@ -46,7 +46,7 @@ class Obvious(Rows):
             return super().lam()
         data, lam = self.data, np.zeros(self.nc)
         if data.nefc:
-            lam[: self.always] = data.efc_force[: self.always]
+            lam[: self.always] = self._along_bodies(data.efc_force, data)
             contacts = data.contact
             for geoms, first in zip(contacts.geom.tolist(), contacts.efc_address.tolist(), strict=True):
                 row = self.alone.get(tuple(sorted(geoms)))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -57,6 +58,7 @@ class Rows:
                     row += 1
         ends = [(kind, i) for kind, i, _ in self.places]
         self.sole = {(kind, i): row for (kind, i, _), row in self.places.items() if ends.count((kind, i)) == 1}
+        self.welds = tuple(_welds(scene, model))
         self.cubic, self.forces = np.array([law.a2 for law in rows_of(scene)[1]]), Forces(scene)
         self.touching = Contacts(scene)
         named = mjcf.names(model, "geom")
@@ -155,7 +157,7 @@ class Rows:
     def lam(self) -> Floats:
         """Return the multiplier of every row (nc,), 0 where it does not act."""
         data, lam = self.data, np.zeros(self.nc)
-        lam[: self.always] = data.efc_force[: self.always]
+        lam[: self.always] = self._along_bodies(data.efc_force, data)
         for j, row in self.present():
             lam[row] += data.efc_force[j]
         for rub in self._rubbing():
@@ -177,10 +179,18 @@ class Rows:
     def jacobian(self) -> Floats:
         """Return H (nc, nv); 0 of a row that is not there."""
         J, H = constraint_jacobian(self.model, self.data), np.zeros((self.nc, self.model.nv))
-        H[: self.always] = J[: self.always]
+        H[: self.always] = self._along_bodies(J, self.data)
         for j, row in self.present():
             H[row] = J[j]
         return H
+
+    def _along_bodies(self, values: Floats, data: Any) -> Floats:
+        """Return what MuJoCo has for the rows that are always on, along the axes that the scene's have."""
+        found: Floats = values[: self.always]
+        for rows, axes in self.welds:
+            found = found.copy()
+            found[rows] = axes(data) @ found[rows]
+        return found
 
     def _geoms(self, part: int) -> frozenset[int]:
         """Return the shapes of a contact; in a file as it stands some meet whose pairs have no rows."""
@@ -239,7 +249,7 @@ class Rows:
                 mujoco.mj_fwdVelocity(self.model, data)
                 mujoco.mj_energyPos(self.model, data)
                 mujoco.mj_energyVel(self.model, data)
-                gaps[i, : self.always], lengths[i] = data.efc_pos[: self.always], data.ten_length
+                gaps[i, : self.always], lengths[i] = self._along_bodies(data.efc_pos, data), data.ten_length
                 energy[i] = data.energy[1], data.energy[0]
                 if lighter:
                     energy[i, 1] += spared @ (data.xipos @ self.model.opt.gravity)
@@ -264,3 +274,31 @@ class Rows:
             poses = {name: (R[: len(part), i], p[: len(part), i]) for name, i in bodies.items()}
             gaps[first : first + TOGETHER] = self.touching.recorded(poses.__getitem__, ways)
         return gaps
+
+
+def _welds(scene: Scene, model: Any) -> Iterator[tuple[slice, Callable[[Any], Floats]]]:
+    """Yield the rotational rows of every weld, and what gives the axes (3, 3) that they are along in the second body.
+
+    MuJoCo's are along those of a site, a scene's along the body's. Of the two quaternions of what is left between both
+    MuJoCo takes the one that comes out, and its rows are the negative of the scene's, which takes the other.
+    """
+    row = 0
+    for i, loop in zip(np.flatnonzero(model.eq_active0), scene.loops, strict=True):
+        if loop.type == "weld":
+            sites = model.eq_objtype[i] == mujoco.mjtObj.mjOBJ_SITE
+            one, two = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
+            ends = (
+                [(int(model.site_bodyid[k]), model.site_quat[k]) for k in (one, two)]
+                if sites
+                else [(one, model.eq_data[i, 6:10]), (two, np.array([1.0, 0.0, 0.0, 0.0]))]
+            )
+            yield slice(row + 3, row + 6), partial(_axes, ends)
+        row += loop.width
+
+
+def _axes(ends: Sequence[tuple[int, Floats]], data: Any) -> Floats:
+    first, second, R = np.zeros(4), np.zeros(4), np.zeros(9)
+    for turn, (body, own) in zip((first, second), ends, strict=True):
+        mujoco.mju_mulQuat(turn, data.xquat[body], own)
+    mujoco.mju_quat2Mat(R, ends[1][1])
+    return R.reshape(3, 3) if first @ second >= 0.0 else -R.reshape(3, 3)

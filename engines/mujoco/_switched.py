@@ -119,7 +119,8 @@ class Switched(Rows):
     def lam(self) -> Floats:
         """Return the multiplier of every row (nc,), and keep it: records are behind steps taken."""
         found = super().lam()
-        self.last = found if self.quiet else np.where(self.contact, 0.0, found)
+        self.last = found.copy() if self.quiet else np.where(self.contact, 0.0, found)
+        self.last[: self.always] = self.data.efc_force[: self.always]  # along MuJoCo's own axes, as what it goes into
         return found
 
     @property
@@ -209,6 +210,7 @@ class Switched(Rows):
         lam = np.zeros(self.nc)
         wanted = [*self.data.efc_aref[: self.always], *self.wanted[rows]]
         lam[[*range(self.always), *rows]] = np.linalg.solve(G, wanted - J @ self.data.qacc_smooth)
+        lam[: self.always] = self._along_bodies(lam, self.data)
         return lam
 
     def approach(self) -> tuple[Floats, Floats, Floats]:

@@ -6,13 +6,15 @@ from typing import Any
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import bogacki, dop853, esdirk, exact
-from crossbody.reference.core.acceleration import GENERAL, accelerate, push_rows
+from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, push_rows
 from crossbody.reference.core.algebra import solve_schur
+from crossbody.reference.core.dop853 import powers
 from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, SHORT, Model, Work
 from crossbody.reference.kinds import Array
 
 CORRECTIONS = 3  # Newton steps onto the rows' own motion; two see the first one's residue vanish in rounding
 RESOLVED = 2.0  # |p| h of the rows' fastest pole p, above which a step tells a gap worse than its law does
+INSIDE = 13  # where the powers at quarters of an implicit step stand, behind those of all stages
 BEND_PART = 1e-3  # of the step, along which the slope of q' is taken
 ARRIVED = 1e-12  # part of the terms behind a multiplier that may be left of the law's: rounding,
 ARRIVED_PART = 0.1  # or this part of the relative tolerance, where nothing is switched
@@ -21,7 +23,8 @@ ARRIVED_PART = 0.1  # or this part of the relative tolerance, where nothing is s
 @compiled
 def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
     """Make the dense output of the step, once; 1 if a stage of it is ill posed."""
-    if s.have_dense or (s.method != EXPLICIT and not (s.has_velocity or s.frictional)):
+    account = s.ledger and s.method == IMPLICIT
+    if s.have_dense or (s.method != EXPLICIT and not (s.has_velocity or s.frictional or account)):
         return 0
     s.have_dense = 1
     if s.method == EXPLICIT:
@@ -29,7 +32,23 @@ def prepare(K: Any, s: Any, m: Model, w: Work) -> int:
     if s.has_velocity:
         _bend(K, s, m, w, s.t_old, w.y, 0, w.bend[0])
         _bend(K, s, m, w, s.t_old + s.hs, w.y1, s.end, w.bend[1])
-    _travel(s, w)
+    if s.has_velocity or s.frictional:
+        _travel(s, w)
+    return _powers_inside(K, s, m, w) if account else 0
+
+
+@compiled
+def _powers_inside(K: Any, s: Any, m: Model, w: Work) -> int:
+    """Leave in w.kz[INSIDE:] the powers at quarters of an implicit step; 1 if one of them is ill posed."""
+    for j in range(3):
+        theta = 0.25 * (j + 1)
+        t = s.t_old + theta * s.hs
+        state(s, m, w, theta, w.ys)
+        if s.na > 0 and not put_on_rows(K, s, m, w, theta, w.ys, tolerated(s)):
+            q, v = w.ys[: s.nq], w.ys[s.nq :]
+            if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
+                return 1
+        powers(K, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], INSIDE + j)
     return 0
 
 
@@ -172,7 +191,26 @@ def ledger(s: Any, w: Work, theta: float, out: Array) -> None:
     if s.method == EXPLICIT:
         dop853.evaluate(w.z, w.Fz, theta, out)
         return
+    if s.method == IMPLICIT:
+        _quadrature(s, w, theta, out)
+        return
     x, h = theta, s.hs
     for i in range(s.nz):
         dz, p0, p1 = w.z1[i] - w.z[i], h * w.kz[0, i], h * w.kz[s.end, i]
         out[i] = w.z[i] + x * (p0 + x * (3.0 * dz - 2.0 * p0 - p1 + x * (p0 + p1 - 2.0 * dz)))
+
+
+@compiled
+def _quadrature(s: Any, w: Work, theta: float, out: Array) -> None:
+    """Out = the ledger, by the quartic through the powers at ends and quarters; it ends where the step's own does."""
+    kz, x = w.kz, theta
+    end = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
+    for i in range(s.nz):
+        p0, p1, p2, p3, p4 = kz[0, i], kz[INSIDE, i], kz[INSIDE + 1, i], kz[INSIDE + 2, i], kz[s.end, i]
+        d1 = (-25.0 * p0 + 48.0 * p1 - 36.0 * p2 + 16.0 * p3 - 3.0 * p4) / 6.0
+        d2 = (70.0 * p0 - 208.0 * p1 + 228.0 * p2 - 112.0 * p3 + 22.0 * p4) / 9.0
+        d3 = (-40.0 * p0 + 144.0 * p1 - 192.0 * p2 + 112.0 * p3 - 24.0 * p4) / 6.0
+        d4 = (32.0 * p0 - 128.0 * p1 + 192.0 * p2 - 128.0 * p3 + 32.0 * p4) / 15.0
+        whole = (7.0 * (p0 + p4) + 32.0 * (p1 + p3) + 12.0 * p2) / 90.0
+        along = x * (p0 + x * (d1 + x * (d2 + x * (d3 + x * d4))))
+        out[i] = w.z[i] + s.hs * (along - end * whole) + end * (w.z1[i] - w.z[i])

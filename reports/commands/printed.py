@@ -29,10 +29,13 @@ TIMES = {"time [ms]": (0, 1e3), "in all [s]": (1, 1.0)}
 """Which time of a run stands below a head, and how many of its unit a second is."""
 DIGITS = {"errors": 0.051, "times": 0.0051, "numbers": 0.00051}
 """Part of a number by which two, three and four digits may be another one."""
+STAGES, TENTH = ("runs", "verdicts", "pages"), 0.0501
+"""Stages of the command, whose times are said to a tenth of a second, and by how much that may be off, s."""
 WIDEST = 12
 """Columns that a cell takes at most."""
 WRONG = ("outside", "crashed")
 _SENTENCE = re.compile(r"(\d+) of (\d+) runs (?:is|are) within all limits")
+_SPENT = re.compile(r"(Time:|[\w.-]+) (\d+\.\d)(?![\d.])")
 _COUNT = re.compile(r"(\d+) ([a-z -]+?)(?: \((\d+) beyond a limit\))?(?:, |$)")
 
 
@@ -55,6 +58,26 @@ def check(printed: Sequence[str], rows: Sequence[Row], times: Times, width: int)
     differing += [*_of_counts(plain[2], rows), *_of_lines(plain[3:], runs)]
     if differing:
         raise OwnFault(f"What was printed is not what was judged: {differing[0]}.")
+
+
+def check_times(text: str, times: Times) -> None:
+    """Hold the line of where the time went against the times of runs: of each engine the sum, and all add up.
+
+    Raises:
+        OwnFault: naming what does not.
+    """
+    said = {name: float(number) for name, number in _SPENT.findall(" ".join(click.unstyle(text).split()))}
+    within = {name: seconds for name, seconds in said.items() if name not in ("Time:", *STAGES)}
+    whole: Counter[str] = Counter()
+    for (_, who), (_, seconds) in times.items():
+        whole[who.partition(":")[0]] += seconds or 0.0  # type: ignore[assignment]  # it counts any number
+    sums = [said["Time:"] - sum(said[name] for name in STAGES)]
+    sums += [said["runs"] - sum(within.values())] if within else []
+    off = [abs(one) / (1 + len(STAGES) + len(whole)) for one in sums]  # what is less than half of a tenth is not said
+    if within or sum(whole.values()) < said["runs"] - TENTH:  # else cases ran at once
+        off += [abs(seconds - within.get(name, 0.0)) for name, seconds in whole.items()]
+    if max(off) > TENTH:
+        raise OwnFault(f"The times that were printed are not those of the runs: {text!r}.")
 
 
 def counted(rows: Sequence[Row]) -> dict[str, int]:

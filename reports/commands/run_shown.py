@@ -67,6 +67,9 @@ def show_time(clock: Sequence[float], times: Times, compiling: float = 0.0) -> N
         clock: when runs, verdicts and pages began, and all ended, s.
         times: of the engines.
         compiling: time that went into compiling, which is part of that of the runs, s.
+
+    Raises:
+        OwnFault: if its parts are not those of the runs; it is printed all the same.
     """
     spent = {"compiling": compiling}
     for (_, who), (_, whole) in times.items():
@@ -78,7 +81,9 @@ def show_time(clock: Sequence[float], times: Times, compiling: float = 0.0) -> N
     rest = runs - sum(spent.values())
     told = f" ({', '.join([*parts, f'truths {rest:.1f}'])})" if parts and rest >= 0.0 else ""
     total = clock[-1] - clock[0]
-    click.echo(layout.told(f"Time: {total:.1f} s: runs {runs:.1f}{told}, verdicts {verdicts:.1f}, pages {pages:.1f}"))
+    text = f"Time: {total:.1f} s: runs {runs:.1f}{told}, verdicts {verdicts:.1f}, pages {pages:.1f}"
+    click.echo(layout.told(text))
+    printed.check_times(text, times)
 
 
 def table(runs: Sequence[EngineRun], times: Times, width: int) -> str:

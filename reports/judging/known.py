@@ -48,11 +48,12 @@ def kinds() -> tuple[ModuleType, ...]:
         known_growth,
         known_parts,
         known_sides,
+        known_sources,
         known_steps,
         known_tables,
     )
 
-    return known_answers, known_sides, known_growth, known_parts, known_steps, known_tables
+    return known_answers, known_sides, known_growth, known_parts, known_sources, known_steps, known_tables
 
 
 def _name() -> str:

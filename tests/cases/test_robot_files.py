@@ -1064,3 +1064,28 @@ def test_a_body_that_floats_on_a_fixed_mount_begins_where_its_file_says(seed: in
     q0 = np.array(cases.from_file(str(path)).q0)
     np.testing.assert_allclose(q0[:3], place.translation, atol=1e-9)
     np.testing.assert_allclose(matrices(q0[3:7]), place.rotation, atol=1e-9)
+
+
+MAST = """<robot name="mast"><link name="ground"/>
+<link name="mast">{mass}<collision><origin xyz="0 0 -1"/><geometry><box size="4 4 .2"/></geometry></collision></link>
+<joint name="stands" type="fixed"><parent link="ground"/><child link="mast"/><origin xyz="0 0 {z}"/></joint>
+<link name="arm">{mass}</link>
+<joint name="lift" type="{lift}"><parent link="mast"/><child link="arm"/><origin xyz="0 0 -.2"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="1" effort="1" velocity="1"/></joint>
+<link name="foot">{mass}<collision><geometry><sphere radius=".1"/></geometry></collision></link>
+<joint name="ankle" type="fixed"><parent link="arm"/><child link="foot"/><origin xyz="0 0 -.3" rpy=".4 0 0"/></joint>
+</robot>
+"""
+
+
+@pytest.mark.parametrize("lift", ["prismatic", "floating"])
+def test_what_the_world_bears_has_its_mass_and_its_shapes_in_every_engine(lift: str, tmp_path: Path) -> None:
+    """MuJoCo's compiler merges it with the world: then bodies have other numbers, and the energy lacks its share."""
+    path = tmp_path / "mast.urdf"
+    mass = '<inertial><mass value="1.5"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    path.write_text(MAST.format(mass=mass, z=1.7, lift=lift))
+    case = cases.load(str(path), t_end=0.02, friction=1)
+    for engine, profile in (("reference", "compiled"), ("mujoco", "as_is")):
+        run = engines.load(engine).prepare(case, profile).run()
+        assert np.abs(run.gap[0] - (1.2 - 0.1 - 0.8)).min() <= 1e-12
+        assert run.energy[0, 1] == pytest.approx(1.5 * 9.81 * (1.7 + 1.5 + 1.2), rel=1e-12)

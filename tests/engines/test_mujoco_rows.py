@@ -172,3 +172,26 @@ def test_a_row_with_two_sets_collides_until_it_is_spent(
         found = rows.entered(modes, [row] if spent else [])
         modes[row] = int(after)
         assert found == tuple(modes)
+
+
+WELDED = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
+<body name="one" pos="0 0 1"><joint name="one" axis="0 1 0"/><geom size=".1" mass="1" contype="0" conaffinity="0"/>
+<site name="a" pos="0 0 -.3" euler="{0}"/></body>
+<body name="two" pos="0 0 .7"><freejoint/><geom type="box" size=".1 .2 .3" mass="1" contype="0" conaffinity="0"/>
+<site name="b" euler="{1}"/></body></worldbody>
+<equality><weld name="joined" site1="a" site2="b"/></equality></mujoco>"""
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rows_of_a_weld_between_turned_sites_are_along_the_axes_that_the_scene_s_have(seed, tmp_path):
+    """MuJoCo has them along the second site's: H, multipliers and gaps are those of the other engines."""
+    rng = np.random.default_rng(seed)
+    path = tmp_path / "welded.xml"
+    path.write_text(WELDED.format(*(" ".join(map(str, rng.uniform(-90.0, 90.0, 3))) for _ in range(2))))
+    case = load_case(str(path), t_end=0.01, assemble=1)
+    own, other = (load(e).prepare(case, p) for e, p in (("mujoco", "as_is"), ("reference", "compiled")))
+    q = own.audit()["q0"] + np.array([0.0, *rng.normal(size=3) * 1e-2, 0.0, 0.0, 0.0, 0.0])
+    assert own.audit()["H"](q) == pytest.approx(other.audit()["H"](q), abs=1e-12)
+    assert np.abs(own.run().gap[0]).max() <= 1e-12
+    matched = load("mujoco").prepare(case, "matched").run()
+    assert matched.lam[0] == pytest.approx(other.run().lam[0], abs=1e-5 * np.abs(matched.lam[0]).max())

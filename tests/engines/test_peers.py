@@ -255,3 +255,20 @@ def test_a_state_that_leaves_the_scene_has_diverged() -> None:
     assert ended(scene, q, np.array([-4.0])) is Outcome.FINISHED
     assert ended(scene, q, np.array([1e9])) is Outcome.DIVERGED
     assert ended(scene, q, np.array([np.nan])) is Outcome.NOT_FINITE
+
+
+@pytest.mark.parametrize("variant", ["sliders", "unequal"])
+def test_obvious_springs_of_exudyn_push_below_the_surface_alone(variant: str) -> None:
+    """Stops of its connectors are at differences of coordinates: the gaps at the start are no part of them."""
+    run = peer("exudyn").prepare(cases.load("newtons_cradle", variant), "default").run()
+    assert run.lam.max() > 1.0
+    assert np.abs(run.lam[run.gap > 1e-9]).max(initial=0.0) <= 1e-9 * run.lam.max()
+
+
+@pytest.mark.parametrize("mass", [0.5, 3.0])
+def test_obvious_springs_of_exudyn_are_the_law_s_by_the_mass_that_they_move(mass: float) -> None:
+    """Read back from the connectors, as a factor that is missing would show."""
+    case = cases.load("bouncing_ball", "linear", mass=mass)
+    found = peer("exudyn").prepare(case, "default").audit()["constants"]
+    assert found["a0"] == pytest.approx(case.law.a0, rel=1e-12)
+    assert found["a1"] == pytest.approx(case.law.a1, rel=1e-12)

@@ -71,6 +71,34 @@ def test_the_ledger_grows_by_the_power_at_every_instant(seed):
         assert np.abs(rate - power).max() <= 10.0 * rtol * np.abs(power).max()
 
 
+PULLED = """
+<mujoco><worldbody>
+<geom name="floor" type="plane" size="5 5 1" friction="{mu} 0 0" condim="3" solref="-10000 -200"/>
+<body pos="0 0 0.1"><joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/>
+<joint name="z" type="slide" axis="0 0 1"/>
+<geom type="sphere" size="0.1" mass="1" friction="{mu} 0 0" condim="3" solref="-10000 -200"/></body></worldbody>
+<actuator><general name="px" joint="x" dyntype="integrator" gainprm="1"/>
+<general name="py" joint="y" dyntype="integrator" gainprm="1"/></actuator>
+<keyframe><key name="pulled" qpos="0 0 0" ctrl="{pull}"/></keyframe></mujoco>
+"""
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+def test_ledger_closes_inside_steps_while_a_force_grows(seed, rtol, tmp_path):
+    """A block is pulled ever harder, sticks and slides: steps are long, and work in them grows with t^4."""
+    rng = np.random.default_rng(seed)
+    pull, path = rng.uniform(15.0, 40.0, 2), tmp_path / "pulled.xml"
+    path.write_text(PULLED.format(mu=0.3, pull=f"{pull[0]} {pull[1]}"), encoding="utf-8")
+    case = cases.load(str(path), "pulled", t_end=0.4, friction=1)
+    run = engines.load("reference").prepare(case, "compiled", rtol=rtol, samples=977).run()
+    assert run.outcome.ok, run.message
+    assert run.counts["implicit_steps"] > 0
+    done = run.ledger.contact.sum(axis=1) + run.ledger.input - run.ledger.dissipated
+    open_by = np.abs(run.total_energy - run.total_energy[0] - done)
+    assert open_by.max() < 200.0 * rtol * (run.ledger.input.max() + run.energy[:, 0].max())
+
+
 def test_work_of_one_bounce_is_the_law_s():
     # No gravity, linear law: the row takes m v^2 (1 - e^2) / 2.
     system = ball(a0=1e4, a1=40.0, a2=0.0, gravity=0.0)

@@ -161,3 +161,22 @@ def test_a_fault_that_is_told_keeps_nothing_from_being_printed(shown: Shown, mon
     monkeypatch.setattr(printed, "check", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         run_shown.show(*drawn(0))
+
+
+TIMES = {("a:v", "one:p"): (9.0, 2.0), ("b:v", "one:q"): (9.0, 3.0), ("a:v", "two-d:p"): (9.0, 1.5)}
+LINE = "Time: 14.5 s: runs 11.0 (one 5.0, two-d 1.5, truths 4.5), verdicts 0.5, pages 3.0"
+
+
+def test_the_line_of_times_is_that_of_the_runs() -> None:
+    printed.check_times(LINE, TIMES)
+    printed.check_times("Time: 9.5 s: runs 6.0, verdicts 0.5,\n    pages 3.0", TIMES)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [("14.5", "11.0"), ("runs 11.0", "runs 9.2"), ("one 5.0", "one 3.0"), ("two-d 1.5", "two-d 9.0"),
+     ("truths 4.5", "truths 6.0"), ("verdicts 0.5", "verdicts 1.5"), ("one 5.0, ", "")],
+)  # fmt: skip
+def test_a_time_that_is_none_of_the_runs_is_a_fault(right: str, wrong: str) -> None:
+    with pytest.raises(OwnFault, match="times that were printed"):
+        printed.check_times(LINE.replace(right, wrong), TIMES)

@@ -206,7 +206,8 @@ def limits(
         metric="energy_residual", value=1e-9, engine="mujoco", profile="default", known=OBVIOUS,
         known_least=(1.0 - NEAR) * turning, known_size=(1.0 + NEAR) * turning,
     )  # fmt: skip
-    return (*_all(mechanism, rule, {**_bounds(mechanism, rule, gap), **counts}), *((turned,) if turning else ()))
+    bounds = {**_bounds(mechanism, rule, gap), **counts}
+    return (*_all(mechanism, rule, bounds, gap > 0.0), *((turned,) if turning else ()))
 
 
 def _bounds(mechanism: str, rule: str, gap: float) -> Bounds:
@@ -221,7 +222,7 @@ def _bounds(mechanism: str, rule: str, gap: float) -> Bounds:
     return kept | ({"pattern_simultaneous": pattern} if gap == 0.0 else {})  # apart, not all collide at once
 
 
-def _all(mechanism: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
+def _all(mechanism: str, rule: str, bounds: Bounds, apart: bool) -> Iterator[Limit]:
     for metric, (value, why) in bounds.items():
         yield Limit(metric=metric, value=value, why=why)
     for (engine, profile), known in _OTHERS[rule].items():
@@ -231,7 +232,7 @@ def _all(mechanism: str, rule: str, bounds: Bounds) -> Iterator[Limit]:
             yield Limit(metric=metric, value=1e-5, engine="mujoco", profile="matched", why=_FIXED)
     if mechanism == "sliders":
         yield Limit(metric="momentum", value=1e-10, why=_KEPT)
-        yield from defaults.sliders(bounds)
+        yield from defaults.sliders(bounds, apart)
         for (engine, profile), (value, why) in _STEP.items():
             yield Limit(metric="largest position (step)", value=value, engine=engine, profile=profile, why=why)
         yield Limit(metric="energy_switching_error", value=1e-6, why="the formula is exact where G is constant")
