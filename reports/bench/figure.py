@@ -73,6 +73,6 @@ def _labels(x: pd.Series, y: pd.Series, setting: pd.Series, least: float) -> lis
         zip(np.log10(x.clip(lower=FLOOR)), np.log10(y.astype(float)), strict=True), setting.astype(float), strict=True
     ):
         apart = abs(here[0] - last[0]) > least or abs(here[1] - last[1]) > 0.5
-        found.append(f"{s:.0e}".replace("e-0", "e-") if apart and np.isfinite(s) else "")
+        found.append(f"{s:.0e}".replace("e-0", "e-").replace("e+0", "e") if apart and np.isfinite(s) else "")
         last = here if apart else last
     return found

@@ -637,5 +637,5 @@ def test_timings_and_names_of_rungs_are_read_on_a_narrow_screen(whole: Path, bro
         "[...document.querySelectorAll('.plot .textpoint text')].map((text) =>"
         " [text.textContent, parseFloat(getComputedStyle(text).fontSize), text.getBoundingClientRect().toJSON()])"
     )
-    assert len(rungs) > 3
+    assert rungs
     assert min(size for _, size, _ in rungs) >= 11.0
