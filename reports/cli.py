@@ -65,7 +65,7 @@ def cli() -> None:
 def list_(name: str | None, plain: bool) -> None:
     """List all names, or the details of a case, robot file, engine or model of logs.
 
-    Names are those of cases, engines, metrics, stress suites and models of logs.
+    Names are those of cases, engines, metrics, stress suites, models and column maps of logs.
     """
     from crossbody.reports import described
 
@@ -383,7 +383,7 @@ def log() -> None:
 
 @log.command("info")
 @click.argument("path", metavar="LOG", type=options.PATH)
-@click.option("--columns", metavar="MAP", help="Column map (TOML) to apply.")
+@options.columns
 @click.option("--part", type=options.COUNT, metavar="N", help="Number of the run, if the map separates several.")
 @click.option("--draft", is_flag=True, help="Print only a draft of a column map.")
 @options.memory

@@ -18,10 +18,11 @@ def everything() -> Named:
     """Return all that has a name; imports none of it."""
     from crossbody import cases, engines
     from crossbody.hw import models
+    from crossbody.hw.reading import published
     from crossbody.reports import metrics, suites
 
     sources = {"Cases": cases, "Engines": engines, "Metrics": metrics, "Stress suites": suites}
-    sources["Models of logs"] = models
+    sources |= {"Models of logs": models, "Column maps of logs": published}
     return {title: {name: source.summary(name) for name in source.names()} for title, source in sources.items()}
 
 

@@ -155,13 +155,20 @@ def told_as_json(tables: Mapping[str, pd.DataFrame]) -> bool:
 def progress(steps: int | None, done: int | None = None) -> Iterator[Callable[[str], None]]:
     """Show a bar on stderr with the time left, advanced each time it is called with what is being done, or was.
 
+    Where stderr is no terminal, what takes long is told once, in a line.
+
     Args:
         steps: how many in all; None where nobody knows.
         done: how many are done already, where each is told of when it is done; else each is told
             of when it begins.
     """
     if silent() or not sys.stderr.isatty():
-        yield lambda _text: None
+        from crossbody.reports.runs import watch
+
+        try:
+            yield watch.doing if done is None and not silent() else lambda _text: None
+        finally:
+            watch.doing("")
         return
     from rich import progress as shown
     from rich.console import Console

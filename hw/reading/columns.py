@@ -29,12 +29,12 @@ import msgspec
 
 from crossbody.cases import ColumnMapError, FormatUnavailable, InvalidValue, arguments
 from crossbody.cases.regular import open_regular
+from crossbody.hw.reading.published import MAPS, names
 from crossbody.hw.reading.units import to_si
 
 LARGEST = 1 << 20  # bytes of a map
 MOST_DOTS = 256  # of a line: TOML parsers take the square of a key's parts
 LONGEST = 300  # characters of a parser's own words
-MAPS = Path(__file__).parents[1] / "maps"
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=64)]
 
 
@@ -190,7 +190,7 @@ def dump_columns(columns: Columns) -> str:
 
 def maps() -> tuple[str, ...]:
     """Names of the maps for published data sets that come along."""
-    return tuple(sorted(path.stem for path in MAPS.glob("*.toml")))
+    return names()
 
 
 def _convert(value: Any, kind: Any, key: str, path: str | Path) -> Any:

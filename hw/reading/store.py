@@ -17,6 +17,7 @@ import numpy as np
 from crossbody.cases import LogFormatError, OutputError, arguments
 from crossbody.cases.arrays import Floats
 from crossbody.cases.regular import open_regular
+from crossbody.hw.reading import published
 from crossbody.hw.reading.columns import Columns, Role, Signal, Time
 from crossbody.hw.reading.log import Log, Provenance
 
@@ -123,7 +124,9 @@ def about(path: Path) -> _About:
         if found is not None:
             return found
     raise LogFormatError(
-        path, "needs a column map (`crossbody log info` drafts one): it is not a log that crossbody stored."
+        path,
+        "needs a column map (`crossbody log info` drafts one; some come with crossbody: "
+        f"{', '.join(published.names())}): it is not a log that crossbody stored.",
     )
 
 

@@ -20,7 +20,7 @@ from crossbody.hw.checks.finding import Finding
 from crossbody.hw.checks.values import ValueCheck
 from crossbody.hw.formats import Column, Group, Reader
 from crossbody.hw.reading.clock_guess import ClockGuess, guess_clock, last_word, looks_like_time
-from crossbody.hw.reading.columns import Columns, Role, Signal, Time, dump_columns, load_columns, safe_name
+from crossbody.hw.reading.columns import Columns, Role, Signal, Time, dump_columns, load_columns, maps, safe_name
 from crossbody.hw.reading.units import to_si
 
 PATTERNS = (
@@ -29,6 +29,12 @@ PATTERNS = (
     (Role.INPUTS, r"(u|tau|torque|cmd|command|effort)\w{0,3}(\[\d+\])?"),
     (Role.REFERENCES, r"(r|ref|reference|target|setpoint|des|desired)\w{0,3}(\[\d+\])?"),
 )
+UNITS = (
+    (Role.COORDINATES, "1", r"q[wxyz]"),  # of a quaternion
+    (Role.COORDINATES, "m", r"[xyz]\d?|p[xyz]"),
+    (Role.VELOCITIES, "m/s", r"v[xyz]"),
+)
+"""Units of what only bodies in space have, by their names."""
 USUAL = {Role.COORDINATES: "rad", Role.VELOCITIES: "rad/s", Role.INPUTS: "N m", Role.REFERENCES: "1", Role.SENSORS: "1"}
 ADMITTED = {Role.COORDINATES: ("rad", "m", "1"), Role.VELOCITIES: ("rad/s", "m/s", "1/s")}
 
@@ -234,7 +240,8 @@ def _add(tables: dict[str, dict[str, Signal]], column: Column, group: GroupSurve
     while name in table:
         name += "_"
     clock = "" if own or group.clock is None else group.clock.column
-    table[name] = Signal(column=column.name, unit=None if unit is not None else USUAL[role], time=clock)
+    guess = next((one for kind, one, pattern in UNITS if kind == role and re.fullmatch(pattern, word)), USUAL[role])
+    table[name] = Signal(column=column.name, unit=None if unit is not None else guess, time=clock)
 
 
 def _si(column: Column) -> str | None:
@@ -246,12 +253,23 @@ def _si(column: Column) -> str | None:
 
 
 def draft_text(found: Survey) -> str:
-    """The draft as TOML, with what was guessed in a comment above."""
+    """The draft as TOML; what the file does not tell, and was guessed, is marked in its line."""
     columns = draft(found)
-    guessed = [f"{role.value}.{name} [{s.unit}]" for role, name, s in columns.signals() if s.unit is not None]
+    head, *signals = re.split(r"(?m)^(?=\[(?!time|options))", dump_columns(columns))
+    marked = [re.sub(r"(?m)^(unit = .*)$", r"\1 # guessed from the name: check", one) for one in signals]
     lines = ["# Draft: roles and names are guessed from the columns' names; check every line."]
-    if guessed:
-        lines.append("# Units that the file does not tell, guessed: " + ", ".join(guessed))
     if columns.time.sample_time is not None:
         lines.append("# No column of times was found: set the sample time, s.")
-    return "\n".join([*lines, dump_columns(columns)])
+        head = re.sub(r"(?m)^(sample_time = .*)$", r"\1 # no measurement: set it", head)
+    if fits := fitting(found):
+        lines.append(f"# All columns of a map that comes with crossbody are here: {', '.join(fits)} (--columns).")
+    return "\n".join([*lines, head + "".join(marked)])
+
+
+def fitting(found: Survey) -> list[str]:
+    """Names of the `maps` all of whose columns a file has."""
+    there = {one.column.name for group in found.groups for one in group.columns}
+    return [
+        name for name in maps() for one in (load_columns(name),)
+        if {one.time.column, *(signal.column for _, _, signal in one.signals())} - {""} <= there
+    ]  # fmt: skip

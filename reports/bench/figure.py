@@ -12,7 +12,9 @@ from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import Panels, look
 
 FLOOR = 1e-16  # least error that is drawn
-APART = 1.0  # decades of error between two labels of a line, twice the decades of time
+LABEL = 11  # height of the name of a rung, pixels
+MOST = 8
+"""Names that fit side by side on a narrow screen; the distance of two is this part of the decades of all errors."""
 
 
 def work_precision(rows: pd.DataFrame) -> Figure:
@@ -21,6 +23,8 @@ def work_precision(rows: pd.DataFrame) -> Figure:
     panels = Panels(f"Work against precision, {cases}; a cross is a run that failed", 560)
     error = rows["error"].astype(float)
     finite = error[np.isfinite(error) & (error > 0.0)]
+    decades = np.ptp(np.log10(finite.clip(lower=FLOOR))) if len(finite) else 0.0
+    apart = max(1.0, float(decades) / MOST)
     edge = 10.0 * float(finite.max()) if len(finite) else 1.0
     for i, ((case, engine, profile), group) in enumerate(
         rows.groupby(["case", "engine", "profile"], sort=False), start=1
@@ -30,7 +34,7 @@ def work_precision(rows: pd.DataFrame) -> Figure:
         told = {"name": label, "legendgroup": label}
         reached = np.isfinite(x)
         if reached.any():
-            _add(panels, group[reached], x[reached].clip(lower=FLOOR), told | _line(group[reached], look(i)))
+            _add(panels, group[reached], x[reached].clip(lower=FLOOR), told | _line(group[reached], look(i), apart))
         if not reached.all():  # no line leads there: nobody knows how far off they are
             marks = {"mode": "markers", "marker": {"symbol": "x", "size": 8, "color": look(i)["color"]}}
             _add(
@@ -44,11 +48,11 @@ def work_precision(rows: pd.DataFrame) -> Figure:
     return panels.figure()
 
 
-def _line(group: pd.DataFrame, style: dict[str, Any]) -> dict[str, Any]:
+def _line(group: pd.DataFrame, style: dict[str, Any], apart: float) -> dict[str, Any]:
     """How the rungs that reach an error are drawn."""
     return {
-        "mode": "lines+markers+text", "text": _labels(group["error"], group["median_ms"], group["setting"]),
-        "textposition": "top center", "textfont": {"size": 9}, "marker": {"symbol": "circle", "size": 8},
+        "mode": "lines+markers+text", "text": _labels(group["error"], group["median_ms"], group["setting"], apart),
+        "textposition": "top center", "textfont": {"size": LABEL}, "marker": {"symbol": "circle", "size": 8},
         "line": {key: style[key] for key in ("color", "dash")},
     }  # fmt: skip
 
@@ -61,14 +65,14 @@ def _add(panels: Panels, group: pd.DataFrame, x: pd.Series, more: dict[str, Any]
     )  # fmt: skip
 
 
-def _labels(x: pd.Series, y: pd.Series, setting: pd.Series) -> list[str]:
-    """Tolerance or step of the rungs that stand apart from the last one that has a label."""
+def _labels(x: pd.Series, y: pd.Series, setting: pd.Series, least: float) -> list[str]:
+    """Tolerance or step of the rungs that are so many decades apart from the last one that has a label."""
     found: list[str] = []
     last = (math.inf, math.inf)
     for here, s in zip(
         zip(np.log10(x.clip(lower=FLOOR)), np.log10(y.astype(float)), strict=True), setting.astype(float), strict=True
     ):
-        apart = abs(here[0] - last[0]) > APART or abs(here[1] - last[1]) > 0.5 * APART
-        found.append(f"{s:.0e}" if apart and np.isfinite(s) else "")
+        apart = abs(here[0] - last[0]) > least or abs(here[1] - last[1]) > 0.5
+        found.append(f"{s:.0e}".replace("e-0", "e-").replace("e+0", "e") if apart and np.isfinite(s) else "")
         last = here if apart else last
     return found

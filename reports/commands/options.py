@@ -249,6 +249,12 @@ def cases(command: _Work) -> _Work:
     return together(command, names, wanted, variant, parameters, out())
 
 
+columns = click.option(
+    "--columns", metavar="MAP", shell_complete=names_of("hw.reading.published"),
+    help="Column map: a TOML file, or one that `crossbody list` names; not needed for a stored log.",
+)  # fmt: skip
+
+
 def replayed(command: _Work) -> _Work:
     """Options that say which log is replayed on which model; results go to a folder of the command's own."""
     return together(
@@ -256,7 +262,7 @@ def replayed(command: _Work) -> _Work:
         click.argument("path", metavar="LOG", type=PATH),
         click.option("--model", "-m", required=True, metavar="M", help="Model; `crossbody list` names them.",
                      shell_complete=names_of("hw.models")),
-        click.option("--columns", metavar="MAP", help="Column map (TOML); not needed for a stored log."),
+        columns,
         click.option("--part", type=COUNT, metavar="N", help="Number of the run, if the map separates several."),
         click.option(
             "--repair", metavar="R", multiple=True, help="fill_dropped, drop_duplicates or unwrap; repeatable."

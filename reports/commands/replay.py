@@ -27,6 +27,7 @@ from crossbody.reports.runs import choice, output, study, watch
 from crossbody.reports.runs.choice import DEFAULT_ENGINES
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.sections import replay as section
 
 GRACE = 2.0
 """Times the limit on an identification after which its process is ended: it stops itself between runs."""
@@ -228,17 +229,26 @@ def _say_outside(rows: pd.DataFrame) -> None:
 
 
 def _say(found: Comparison, metrics: pd.DataFrame) -> None:
+    told = metrics.assign(valid=list(map(layout.valid, metrics["expected"], metrics["limit"])))
+    click.echo(layout.told(f"{section.judged(told)} {section.explained(told)}") + "\n")
     source = f"{replay.tier(found.log)}: {found.log.provenance.file}"
     click.echo(layout.told(f"{source} on {found.model}, {several(len(found.windows), 'window')}"))
     for one in replay.findings(found).to_dict(orient="records"):
         if one["what"] != "repair":
             place = f"{one['channel']}, row {one['row']}: " if one["channel"] else ""
             click.echo(layout.told(f"note: {place}{one['text']}"))
+    speed = metrics[metrics["metric"] == "speed"]
+    metrics = metrics[metrics["metric"] != "speed"]
     units = metrics["unit"].map(lambda unit: unit_text(unit, " [{}]"))
     name = (metrics["metric"] + " " + metrics["channel"]).str.strip() + units
     wide = metrics.assign(metric=name).pivot(index="metric", columns="who", values="value").loc[name.unique()]
-    cells = {who: [f"{value:.5g}" for value in wide[who]] for who in wide.columns}
+    whose: dict[tuple[str, ...], list[str]] = {}
+    for who in wide.columns:
+        whose.setdefault(tuple(f"{value:.4g}" for value in wide[who]), []).append(who)
+    cells = {", ".join(whom) if len(whose) > 1 else "all": list(column) for column, whom in whose.items()}
     click.echo(layout.split(list(wide.index), cells, layout.columns()))
+    times = ", ".join(f"{who} {value:.3g}" for who, value in zip(speed["who"], speed["value"], strict=True))
+    click.echo(layout.told(f"Speed, in times of real time: {times}"))
     for (engine, profile), why in found.skipped.items():
         click.echo(layout.told(f"skipped {engine}:{profile}: {why}"))
 

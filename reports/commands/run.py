@@ -133,7 +133,7 @@ def _beside(cases: Sequence[Case], parts: Parts, do: Callable[[int], int], at_on
     if min(at_once, len(missing)) < 2:
         return 0
     parts.begin()  # for all of them
-    with progress(len(missing)) as tell:
+    with progress(len(missing), 0) as tell:
 
         def told(k: int) -> None:
             parts.keep()

@@ -49,7 +49,7 @@ def show(rows: Sequence[Row], times: Times) -> None:
     """
     runs = runs_of(rows)
     above = [layout.told(sentence(runs)), table(runs, times, layout.columns()), layout.told(counted(rows))]
-    lines = [text for run in runs for text in wrong(run)]
+    lines = wrong(runs)
     lines += [_lost(run, row) for run in runs for row in run.rows if row["regression"] == Regression.LOST]
     texts = [*above, *map(layout.told, [*lines, *([] if voice.quiet() else _absent(runs))])]
     for i, text in enumerate(texts):
@@ -113,14 +113,23 @@ def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.0f}" if value >= 1e3 else f"{value:.3g}"
 
 
-def wrong(run: EngineRun) -> list[str]:
-    """Say what is wrong with a run: one sentence if it did not finish, else one for each number."""
-    if (row := run.failed) is None:
-        return [_wrong(run, row) for row in run.wrong]
+def wrong(runs: Sequence[EngineRun]) -> list[str]:
+    """Say what is wrong: a sentence for each run that did not finish, a line a number, and each reason once."""
+    found: dict[str, list[str]] = {}
+    for run in (run for run in runs if run.failed is None):
+        for row in run.wrong:
+            found.setdefault(row["why"], []).append(_wrong(run, row))
+    lines = [_unfinished(run, run.failed) for run in runs if run.failed]
+    for why, (first, *rest) in found.items():
+        lines += [first, *rest, f"The reason of these {len(rest) + 1}: {why}"] if rest else [f"{first}. {why}"]
+    return lines
+
+
+def _unfinished(run: EngineRun, row: Row) -> str:
     rest = len(run.wrong) - 1
     more = f" and the {rest} numbers that this makes wrong" if rest else ""
     do = f"The report has its motion up to there{more}; a shorter --t-end judges it up to there."
-    return [f"{row['verdict']}: {run.label} {run.who} did not finish. {row['why']} {do}"]
+    return f"{row['verdict']}: {run.label} {run.who} did not finish. {row['why']} {do}"
 
 
 def _wrong(run: EngineRun, row: Row) -> str:
@@ -130,7 +139,7 @@ def _wrong(run: EngineRun, row: Row) -> str:
         number = " has no number" if math.isnan(row["value"]) else f" {size}"
         number += "" if math.isnan(row["limit"]) else f", limit{NO_BREAK}{row['limit']:.4g}"
     place = f" ({row['where']})" if row.get("where") else ""
-    return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}{place}. {row['why']}"
+    return f"{row['verdict']}: {run.label} {run.who} {row['metric']}{number}{place}"
 
 
 def _lost(run: EngineRun, row: Row) -> str:

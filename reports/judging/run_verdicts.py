@@ -23,6 +23,7 @@ from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of,
 from crossbody.reports.judging.stored import Deviations, changed, defaults, deviations, differing, lacking, words
 from crossbody.reports.judging.verdict import (
     IDENTITIES,
+    LACKS,
     ROUNDING,
     Regression,
     Verdict,
@@ -411,7 +412,7 @@ def _row(
     if name in judge_.claims:
         return judge_.missing(name, metric.UNIT, "The run does not tell it.", needs)
     if wanted and metric.measure(truth, truth.trajectory, judge_.case) is not None:
-        return judge_.missing(name, metric.UNIT, "The run lacks this number, which the truth has.", needs)
+        return judge_.missing(name, metric.UNIT, LACKS, needs)
     return None
 
 

@@ -6,10 +6,11 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, SPLIT, part_of
-from crossbody.reports.judging.verdict import IDENTITIES, Row, Word
-from crossbody.reports.layout import valid
+from crossbody.reports.judging.verdict import IDENTITIES, LACKS, Row, Word
+from crossbody.reports.layout import unit_text, valid
 from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
@@ -19,6 +20,14 @@ FINISHED = "finished"  # the row that says whether a run came to its end
 _CLAUSE = re.compile(r"[:;,.](?:\s|$)")
 """What ends the first clause of a reason."""
 NAMED = 3  # runs that the sentence names
+QUANTITIES = frozenset(
+    {
+        "position", "angle_error", "velocity", "lam_error", "lam_impulse", "lam_impulse_path", "collision_impulse",
+        "friction_impulse", "friction_work", "contact_work", "energy_drift", "energy_integrator", "energy_law",
+        "event_times", "mode_times", "slip_times", "stick_times",
+    }
+)  # fmt: skip
+"""Metrics of motion, force, energy and events: they tell more than identities of records, laws and counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +47,7 @@ class EngineRun:
     @property
     def wrong(self) -> list[Row]:
         """Rows that are outside or crashed, the farthest out first."""
-        return sorted((row for row in self.rows if row["verdict"] in WRONG), key=share, reverse=True)
+        return sorted((row for row in self.rows if row["verdict"] in WRONG), key=farthest)
 
     @property
     def failed(self) -> Row | None:
@@ -55,12 +64,12 @@ class EngineRun:
     @property
     def deviates(self) -> Row | None:
         """The number beyond its limit within bounds that are known of the engine: of position if there is one."""
-        return max((row for row in self.rows if row["verdict"] == Word.EXPECTED), key=_telling, default=None)
+        return min((row for row in self.rows if row["verdict"] == Word.EXPECTED), key=telling, default=None)
 
     @property
     def unbounded(self) -> Row | None:
         """The number beyond its limit that may be so, unknown how far: of position if there is one."""
-        return max(filter(beyond, self.rows), key=_telling, default=None)
+        return min(filter(beyond, self.rows), key=telling, default=None)
 
     @property
     def skipped(self) -> bool:
@@ -90,9 +99,24 @@ def share(row: Row) -> float:
     return off / limit if limit > 0.0 and math.isfinite(off) else math.inf
 
 
-def _telling(row: Row) -> tuple[bool, bool, float]:
-    """How much of a run a number beyond its limit tells: most if it is of position, then if it is far out."""
-    return row["metric"] == "position", math.isfinite(share(row)), share(row)
+def lacking(row: Row) -> str:
+    """Say in few words why a row has no number."""
+    if row["verdict"] == Word.SKIPPED:
+        return "not run"
+    if row["verdict"] == Word.INFO and not row["why"].startswith(LACKS):
+        return "not measured"
+    return "no such event" if row["metric"].endswith("_times") else "no number"
+
+
+def farthest(row: Row) -> tuple[bool, bool, float]:
+    """Sort what has no number first, then by multiples of limits, and last what must be exact, such as counts."""
+    times = share(row)
+    return math.isfinite(row["value"] or 0.0), not math.isfinite(times), -times
+
+
+def telling(row: Row) -> tuple[Any, ...]:
+    """Sort what tells most of a run first: position, other quantities, all else; of each what is farthest out."""
+    return row["metric"] != "position", row["metric"] not in QUANTITIES, *farthest(row)
 
 
 def sentence(runs: Sequence[EngineRun]) -> str:
@@ -103,15 +127,15 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         return f"Nothing is judged, since no engine has run.{_known_until(runs)}"
     if all_ran and not ran and not any(run.wrong for run in runs):  # a truth may be outside by itself
         return "Nothing is judged, since no number has a limit."
-    off = sorted((run for run in runs if run.wrong), key=lambda run: -share(run.wrong[0]))
+    off = sorted((run for run in runs if run.wrong), key=lambda run: (run.failed is None, farthest(run.wrong[0])))
     right = [run for run in ran if not run.wrong]
     known = [(run, row) for run in right if (row := run.deviates)]
     loose = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
     text = _counted(len(right) - len(known) - len(loose), len(ran), [run.who for run, _ in known])
     if known:
-        run, row = max(known, key=lambda one: _telling(one[1]))
+        run, row = min(known, key=lambda one: telling(one[1]))
         cause = _CLAUSE.split(row["why"])[0]
-        text += f" The largest deviation: {_off(run, row)}: {cause[:1].upper()}{cause[1:]}."
+        text += f" The largest deviation of {row['metric']}: {_off(run, row)}: {cause[:1].upper()}{cause[1:]}."
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     if off:
@@ -161,7 +185,8 @@ def _off(run: EngineRun, row: Row) -> str:
     if run.failed:
         return f"{run.who} on {run.label} (did not finish)"
     times = share(row)
-    size = f"{row['value']:.2g}, {times:.2g} times its limit" if math.isfinite(times) else row["verdict"]
+    unit = " of its largest value" if row.get("where") else unit_text(row.get("unit", ""))
+    size = f"{row['value']:.2g}{unit}, {times:.2g} times its limit" if math.isfinite(times) else row["verdict"]
     if row.get("unit") == "%" and math.isfinite(times):  # a share of the whole is no multiple of what it may lack
         size = f"{row['value']:.3g} %, where {valid(row['expected'], row['limit'])} % is valid"
     size += f": {row['where']}" if row.get("where") else ""

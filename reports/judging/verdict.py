@@ -19,6 +19,7 @@ NOUGHT = 1e-6
 ROUNDING = 1e-12
 """Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
+LACKS = "The run lacks this number, which the truth has."
 IDENTITIES = frozenset(
     {
         "start_error",

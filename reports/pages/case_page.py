@@ -12,7 +12,7 @@ from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import called, label, style
-from crossbody.reports.judging.told import beyond, share
+from crossbody.reports.judging.told import beyond, lacking, telling
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.friction import friction, hysteresis
@@ -103,7 +103,7 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": [row | {"beyond": beyond(row)} for row in rows],
+            "rows": [row | {"beyond": beyond(row), "lacking": lacking(row)} for row in rows],
             "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
             "truths": _truths(case.about), "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
@@ -117,11 +117,9 @@ def _truths(about: Mapping[str, Any]) -> str:
     return f"{tier[:1]}: {tier}" if figures.of_log(about) else ", ".join(Tier)
 
 
-def _far(row: Row) -> tuple[int, float]:
-    """The worst word first, and of one word what is farthest out."""
-    word = row["verdict"]
-    known = word in grid.WORST or beyond(row)
-    return (grid.RANKED.index(word), -share(row)) if known else (len(grid.RANKED), 0.0)
+def _far(row: Row) -> tuple[Any, ...]:
+    """The worst word first, and of one word what tells most."""
+    return grid.RANKED.index(row["verdict"]) if grid.held(row) else len(grid.RANKED), *telling(row)
 
 
 def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[Section]:
@@ -130,7 +128,7 @@ def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[S
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
     drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES}
     return [
-        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces), plots=plots)
+        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces, limits), plots=plots)
         for name, plots in drawn.items() if plots
     ]  # fmt: skip
 

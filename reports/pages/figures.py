@@ -108,6 +108,22 @@ def farthest(traces: Sequence[Trace]) -> list[int]:
     return _most(sizes)
 
 
+def still(traces: Sequence[Trace], limits: Limits = NONE) -> list[int]:
+    """Coordinates that go in no run farther from the start than their limit: what they do is rounding.
+
+    None if all do: then that is the motion. Of a quaternion all four or none.
+    """
+    count = len(traces[0].about["coordinates"])
+    scales = np.array(traces[0].about.get("scales", ()) or [0.0] * count)
+    turns = _turns(traces)
+    scales[turns] = 1.0
+    moved = _largest((trace.run.q - traces[0].run.q[:1] for trace in traces), count)
+    for at in traces[0].quaternions:
+        moved[at : at + 4] = moved[at : at + 4].max()
+    rests = moved < min(limits.get("position", {}), default=IDLE) * scales
+    return [] if rests.all() else np.flatnonzero(rests).tolist()
+
+
 def _turns(traces: Sequence[Trace]) -> list[int]:
     """Which coordinates are of quaternions."""
     return [at + i for at in traces[0].quaternions for i in range(4)]
@@ -164,8 +180,8 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE,
         for place, k in enumerate(shown):
             sheet.line(trace, i, 2 * place, q[:, k], t)
             if trace.truth is not None:
-                error = apart(trace.run.q[:, k], trace.truth.q[:, k], floors[names[k][1]])
-                sheet.line(trace, i, 2 * place + 1, error)
+                floor = floors[names[k][1]]
+                sheet.line(trace, i, 2 * place + 1, apart(trace.run.q[:, k], trace.truth.q[:, k], floor), floor=floor)
     scales = traces[0].about.get("scales", ())
     least = min(limits.get("position", {}), default=0.0)
     turns = _turns(traces)
@@ -207,7 +223,7 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
             sheet.line(trace, i, 3 * place, trace.run.lam[:, k])
             sheet.line(trace, i, 3 * place + 1, summed[i][:, k])
             if (exact := true[i]) is not None:
-                sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor))
+                sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor), floor=floor)
         ends, far = robust(traces, k)
         if ends is not None:
             sheet.clip(3 * place, *ends)
@@ -279,7 +295,7 @@ def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
         if work.any():
             sheet.line(trace, i, 1, work)
         book = work + run.ledger.input - run.ledger.dissipated
-        sheet.line(trace, i, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor))
+        sheet.line(trace, i, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor), floor=floor)
     sheet.logarithmic(2)
     for limit, name in limits.get("energy_integrator", {}).items():
         sheet.limit(2, limit * energy_of(traces[0].run), name)
@@ -350,8 +366,8 @@ def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limi
     if name not in SIGNALS:
         figure = draw(traces, points, limits)
         return [Plot(name=f"plot-{name}", figure=figure, time=True)] if figure["data"] else []
-    noun, ranked, more = SIGNALS[name]
-    order = ranked(traces)[:MOST_SIGNALS]
+    noun, _, more = SIGNALS[name]
+    order = _ranked(name, traces, limits)[:MOST_SIGNALS]
     if not order:
         return []
     cut = FIRST[name] if len(order) > FIRST[name] + 1 else len(order)
@@ -364,17 +380,23 @@ def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limi
     return found
 
 
+def _ranked(name: str, traces: Sequence[Trace], limits: Limits) -> list[int]:
+    """Signals of a figure that say anything, those that matter most first."""
+    rests = still(traces, limits) if name == "motion" else []
+    return [k for k in SIGNALS[name][1](traces) if k not in rests]
+
+
 def _names(traces: Sequence[Trace], noun: str) -> list[str]:
     """Names of coordinates or contacts."""
     return [one if isinstance(one, str) else one["name"] for one in traces[0].about[noun]]
 
 
-def note(name: str, traces: Sequence[Trace]) -> str:
+def note(name: str, traces: Sequence[Trace], limits: Limits = NONE) -> str:
     """What the reader of a figure must know."""
     told = [LOG_NOTE if name == "motion" and of_log(traces[0].about) else NOTES.get(name, "")]
     if name in SIGNALS:
-        noun, order, _ = SIGNALS[name]
-        names, found = _names(traces, noun), order(traces)
+        noun = SIGNALS[name][0]
+        names, found = _names(traces, noun), _ranked(name, traces, limits)
         if len(found) > MOST_SIGNALS:
             told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
         if name in IDLE_NOTES and (rest := [names[k] for k in range(len(names)) if k not in found]):
@@ -425,15 +447,19 @@ NOTES = {
         "Impacts are matched first, and the arcs between them compared; the errors of their times are the "
         "metric event_times. An error ends with the last sample that has a counterpart in the truth, early "
         "if impacts come sooner than the truth's. Differences are cut off at a common floor, the rounding error "
-        "of the largest value of that unit. Across long steps of a solver, a cubic through q and v at both "
-        "ends is drawn."
+        "of the largest value of that unit; a line that leaps from there begins anew. Across long steps of a solver, a "
+        "cubic through q and v at both ends is drawn."
     ),
     "force": (
         "A small delay of an impact changes the force a lot at one instant, but hardly its impulse: "
         "judge by the impulse. Instantaneous collisions are steps of the impulse."
     ),
 }
-IDLE_NOTES = {"force": "Without force in every run", "penetration": "Never below the surface"}
+IDLE_NOTES = {
+    "motion": "At rest in every run, to within the limit",
+    "force": "Without force in every run",
+    "penetration": "Never below the surface",
+}
 FIGURES: dict[str, tuple[str, Callable[..., Figure]]] = {
     "motion": ("Motion", motion),
     "force": ("Contact force", force),

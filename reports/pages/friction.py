@@ -13,8 +13,7 @@ from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import LINE, coded, label, plain, style
-from crossbody.reports.pages.figures import carrying, force_kind, robust
-from crossbody.reports.pages.sheet import off_scale
+from crossbody.reports.pages.figures import carrying, force_kind
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 from crossbody.reports.scenes.scene import slip
@@ -23,7 +22,7 @@ MOST_CONTACTS = 6  # of which one can be chosen
 MOST_OF_DEPTH = 1500  # points of one engine's line
 OVER_DEPTH = (
     "Force over penetration depth of one contact. A spring gives a line; damping opens it to a loop "
-    "whose area is the energy lost. A force below zero pulls."
+    "whose area is the energy lost. A force below zero pulls. Hide an engine to see the loops of others larger."
 )
 DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
 MOST = 1000  # points of one engine's line
@@ -58,15 +57,11 @@ def _loop(traces: Sequence[Trace], k: int, most: int, name: str) -> Plot | None:
     """Force over depth of one contact in every engine."""
     lines = [line for i, trace in enumerate(traces) if (line := _over_depth(trace, i, k, most))]
     contact = traces[0].about["contacts"][k]
-    ends, far = robust(traces, k)
     unit, kind = force_kind(traces, k)
-    off = off_scale({who: [(size, unit, contact)] for who, size in far.items()})
-    title = f"Force over depth, contact {plain(contact)}{off and f'. Off scale: {plain(off)}'}"
     layout = {
-        "title": {"text": title}, "height": 420, "showlegend": False,
+        "title": {"text": f"Force over depth, contact {plain(contact)}"}, "height": 420, "showlegend": False,
         "xaxis": {"title": {"text": f"depth [{'m' if unit == 'N' else 'rad'}]"}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": f"{kind} [{unit}]"}, "exponentformat": "power", "rangemode": "tozero"}
-        | ({"range": list(ends)} if ends else {}),
+        "yaxis": {"title": {"text": f"{kind} [{unit}]"}, "exponentformat": "power", "rangemode": "tozero"},
     }  # fmt: skip
     return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact) if lines else None
 
@@ -85,14 +80,15 @@ def _busiest(traces: Sequence[Trace]) -> list[int]:
 
 
 def _over_depth(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
-    """Force over depth of one engine while its contact carries, broken where it does not; or empty."""
+    """Force over depth of one engine while its contact carries, from no force on the surface and back; or empty."""
     depth, lam = -trace.run.gap[:, k], trace.run.lam[:, k]
     carries = np.isfinite(lam) & (lam != 0.0) & np.isfinite(depth)
     if not carries.any():
         return {}
-    near = carries | np.insert(carries[:-1], 0, False)  # the first sample that does not carry ends a line
-    x, y = (np.where(carries, values, np.nan)[near] for values in (depth, lam))
-    at = distinct(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), most), np.flatnonzero(np.isnan(y)))
+    near = carries | np.append(carries[1:], False) | np.insert(carries[:-1], 0, False)
+    unknown = ~np.isfinite(lam + depth)
+    x, y = (np.where(unknown, np.nan, np.where(carries, values, 0.0))[near] for values in (depth, lam))
+    at = distinct(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), most), np.flatnonzero(~carries[near]))
     look = style(trace, i)
     return {
         "type": "scatter", "mode": "lines", "x": coded(x[at].astype(np.float32)),

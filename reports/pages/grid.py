@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import WRONG, beyond, runs_of, share
+from crossbody.reports.judging.told import FINISHED, WRONG, beyond, lacking, runs_of, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
-from crossbody.reports.pages.html import number
+from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.pages.html import BEYOND, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
@@ -46,6 +47,7 @@ class Cell:
         text, small: shown, and below it.
         page, anchor: where it leads: the verdicts of a page, "engine" or "engine~metric".
         heat: decades beyond a limit, 0 to FARTHEST, or from a millionth of it up; -1 where there is none.
+        told: shown instead of the text, where that is no number.
     """
 
     title: str
@@ -55,6 +57,12 @@ class Cell:
     page: str = ""
     anchor: str = ""
     heat: int = -1
+    told: str = ""
+
+    @property
+    def look(self) -> str:
+        """What decides its sign and colour: the verdict, but of what is beyond a limit that nothing is judged by."""
+        return BEYOND if self.word == Word.INFO and self.heat >= 0 else self.word
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +124,7 @@ def verdict(rows: Sequence[Row]) -> str:
 def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | None) -> Cell:
     """The cell of one engine on one case: worst verdict, error of position and run time."""
     if not rows:
-        return Cell(title=f"{who} was not selected for {label}.")
+        return Cell(title=f"{who} was not selected for {label}.", told="not selected")
     word, text = worst(rows)
     error = next((row["value"] for row in rows if row["metric"] == "position"), None)
     parts = ["" if error is None or error != error else f"{error:.0e}", duration(wall)]
@@ -124,7 +132,8 @@ def whole(label: str, page: str, who: str, rows: Sequence[Row], wall: float | No
     title = f"{who} on {label}: {text} {word}. {said[:300]}".strip()
     small = " · ".join(part for part in parts if part)
     heat = max((heat_of(row) for row in rows if row["verdict"] == word), default=-1)
-    return Cell(title=title, word=word, text=text, small=small, page=page, anchor=who, heat=heat)
+    told = "not run" if word == Word.SKIPPED else f"{text}, {word}" if word == Word.INFO and heat >= 0 else ""
+    return Cell(title=title, word=word, text=text, small=small, page=page, anchor=who, heat=heat, told=told)
 
 
 def held(row: Row) -> bool:
@@ -150,7 +159,7 @@ def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, floa
     engines = ran(rows)
     least = min((wall for wall in walls.values() if wall), default=0.0)
     together = [whole(label, page, who, mine[who], None) for who in engines]
-    costs = [_cost(walls.get(who), least) for who in engines]
+    costs = [_none(who) if not walls.get(who) else _cost(walls[who], least) for who in engines]
     return [
         Line(text="all judged", small="error of position" if "position" in by(rows, "metric") else "", cells=together),
         Line(text="run time", small="relative to the fastest", cells=costs),
@@ -164,33 +173,43 @@ def ran(rows: Sequence[Row]) -> list[str]:
     return [who for who in names(rows) if who not in skipped] or names(rows)
 
 
-def _cost(wall: float | None, least: float) -> Cell:
-    if not wall:
-        return Cell(title="no run")
+def _none(who: str) -> Cell:
+    """The cell of an engine that has no such number; nothing for the truth, which others are held against."""
+    return Cell(title="no such number", told="" if who == f"{TRUTH}:" else "none")
+
+
+def _cost(wall: float, least: float) -> Cell:
     times = wall / least
     return Cell(title="", word="plain", text=duration(wall), small=f"{times:.{0 if times > 10.0 else 1}f} times")
 
 
 def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Sequence[str], page: str) -> list[Line]:
     judged = list(filter(held, rows))
-    far: dict[str, float] = {}
-    for row in judged:
-        far[row["metric"]] = max(far.get(row["metric"], 0.0), share(row))
-    far |= {name: far.get("position", 0.0) for name in SHARES}
+    first = {metric: min(map(_urgent, those)) for metric, those in by(judged, "metric").items()}
+    if "position" in first:
+        first |= dict.fromkeys(SHARES, first["position"])
     judged += [row for row in rows if judged and row["metric"] in SHARES]
     units = {row["metric"]: unit_text(row["unit"], "[{}]") for row in judged or rows}
-    first = [name for name in KEY if name in units]
-    order = sorted(units, key=lambda name: (-far.get(name, 0.0), first.index(name) if name in first else len(first)))
+    key = [name for name in KEY if name in units]
+    order = sorted(units, key=lambda name: (first.get(name, ()), key.index(name) if name in key else len(key)))
     values = {who: {row["metric"]: row for row in mine[who]} for who in engines}
     return [
-        Line(text=name, small=units[name], cells=[_value(values[who].get(name), page) for who in engines])
+        Line(
+            text=name,
+            small=units[name],
+            cells=[_value(values[who][name], page) if name in values[who] else _none(who) for who in engines],
+        )
         for name in order
     ]
 
 
-def _value(row: Row | None, page: str) -> Cell:
-    if row is None:
-        return Cell(title="no such number")
+def _urgent(row: Row) -> tuple[Any, ...]:
+    """Sort runs that did not finish first, then what is beyond its limit; of each what tells most."""
+    failed = row["metric"] == FINISHED and row["verdict"] in WRONG
+    return not failed, not share(row) > 1.0, *telling(row)
+
+
+def _value(row: Row, page: str) -> Cell:
     limit = row["limit"]
     allowed = f", limit {number(limit)}" if limit is not None and limit == limit else ""
     below, value = bounded(row["value"], row["known"])
@@ -199,7 +218,8 @@ def _value(row: Row | None, page: str) -> Cell:
     title = f"{row['who']}, {row['metric']}: {below}{number(value)}{unit}{allowed}{place}. {row['why']}"
     anchor = f"{row['who']}~{row['metric']}"
     text = below + short(value)
-    return Cell(title=title, word=row["verdict"], text=text, page=page, anchor=anchor, heat=heat_of(row))
+    told = lacking(row) if text == "-" else ""
+    return Cell(title=title, word=row["verdict"], text=text, page=page, anchor=anchor, heat=heat_of(row), told=told)
 
 
 def short(value: float | None) -> str:

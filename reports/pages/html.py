@@ -40,7 +40,7 @@ PLOTLY, SCRIPT, STYLE = "plotly.min.js", "crossbody.js", "crossbody.css"
 PARTS = ("page.js", "plots.js", "solids.js", "player.js")  # the pages' own script, in this order
 SIGNS = {
     "within": "✓", "outside": "✗", "expected-outside": "≈", "not judged": "·",
-    "ledger only": "∑", "skipped": "-", "crashed": "!",
+    "ledger only": "∑", "skipped": "-", "crashed": "!", (BEYOND := "beyond, not judged"): "▲",
 }  # fmt: skip
 """A verdict is shown by sign and word besides its colour."""
 MOST = 2000  # rows of a table that a page shows; the file beside it has all
@@ -170,11 +170,12 @@ def environment() -> Environment:
         "bounded": bounded,
         "slug": slug,
         "told": told,
+        "same": same,
         "plot": plot,
         "text_packed": packed_text,
         "value_packed": packed_value,
     }
-    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "MOST": MOST, "UNFOLDED": UNFOLDED}
+    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "BEYOND": BEYOND, "MOST": MOST, "UNFOLDED": UNFOLDED}
     return made
 
 
@@ -255,17 +256,31 @@ def slug(text: str) -> str:
 
 
 def told(table: Table) -> list[Column]:
-    """Columns in which some row has a value; all where there are no rows."""
+    """Columns in which some row has a value, and not all the same text; all where there are no rows."""
     known = [row.get(column.key) for column in table.columns for row in table.rows]
     empty = [all(v is None or v == "" or v != v for v in known[i * len(table.rows) : (i + 1) * len(table.rows)])
              for i in range(len(table.columns))]  # fmt: skip
-    return [column for column, nothing in zip(table.columns, empty, strict=True) if not (nothing and table.rows)]
+    left = same(table)
+    return [
+        column for column, nothing in zip(table.columns, empty, strict=True)
+        if column.title not in left and not (nothing and table.rows)
+    ]  # fmt: skip
+
+
+def same(table: Table) -> dict[str, str]:
+    """What is in every row of several: titles of columns of text, which the page says once instead, and that text."""
+    found = {
+        column.title: {str(row.get(column.key) or "") for row in table.rows}
+        for column in table.columns if column.kind == Kind.TEXT
+    }  # fmt: skip
+    several = len(table.rows) > 1
+    return {title: min(texts) for title, texts in found.items() if several and len(texts) == 1 and any(texts)}
 
 
 def number(value: Any) -> str:
-    """A number for a table: a count in full, any other with four digits, a dash where there is none."""
+    """A number for a table: a count in full, any other with four digits, a word where there is none."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "-"
+        return "none"
     if isinstance(value, float) and WRITTEN_OUT <= abs(value) < 100.0 * WRITTEN_OUT:
         return f"{float(f'{value:.4g}'):.0f}"
     return f"{value + 0.0:.4g}" if isinstance(value, float) else str(value)

@@ -13,12 +13,12 @@ import numpy as np
 from crossbody.cases import installed
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import look
-from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share
+from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
-from crossbody.reports.pages.html import Page
+from crossbody.reports.pages.html import BEYOND, Page
 from crossbody.reports.pages.precision import overview
 from crossbody.reports.pages.results import CaseFiles, Results
 from crossbody.reports.pages.summary import deviations, engines
@@ -143,10 +143,10 @@ def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
 
 
 def _worst(found: Results, case: CaseFiles) -> str:
-    """The number of the worst word that is farthest out, in a few words; one without a limit only if it is wrong."""
+    """The number of the worst word that tells most, in a few words; one without a limit only if it is wrong."""
     held = [row for row in found.rows.get(case.label, ()) if grid.held(row) and share(row) > 0.0]
     known = [row for row in held if row["verdict"] in WRONG or math.isfinite(share(row))]
-    row = max(known, key=lambda row: (-grid.RANKED.index(row["verdict"]), share(row)), default=None)
+    row = min(known, key=lambda row: (grid.RANKED.index(row["verdict"]), *telling(row)), default=None)
     return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}" if row else ""
 
 
@@ -178,7 +178,7 @@ def _tiles(found: Results) -> dict[str, Any]:
         *({"value": n, "title": word, "word": word} for word, n in words.items()),
     ]
     if loose:
-        tiles.append({"value": loose, "title": "beyond a limit, not judged", "word": Word.INFO.value})
+        tiles.append({"value": loose, "title": "beyond a limit, not judged", "word": BEYOND})
     if failed:
         tiles.append({"value": failed, "title": "failed parity audits", "word": Word.OUTSIDE.value})
     return {"tiles": tiles, "warnings": [text for text in (_version(found),) if text]}

@@ -26,6 +26,7 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 group, between groups (with times), pixels."""
 NAME = 12  # height of the name of a line beside its plot, pixels
 SEEN = 6  # height of a band that is seen around the truth, pixels
+LEAP = 100.0  # times a floor: a line that goes from there farther within one sample is broken
 DIGITS = 12  # of the mantissa of a value on a logarithmic axis, bits: four decimal ones
 MODE_COLOURS = {
     Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
@@ -75,23 +76,26 @@ class Sheet:
         """Say in the title how far a line goes beyond its plot; of an engine's lines, the farthest."""
         self.far.setdefault(who, []).append((size, unit, where))
 
-    def line(self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, **more: Any) -> None:
-        """One line of one engine into plot `row`, thinned; what is not finite is a gap."""
+    def line(
+        self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, floor: float = 0.0, **more: Any
+    ) -> None:  # fmt: skip
+        """One line of one engine into plot `row`, thinned; what is not finite, or leaps from a floor, is a gap."""
         t = trace.run.t if t is None else t
         if not len(t) or not np.isfinite(y).any():
             return
         most = int(np.clip(SHARE * self.points / AROUND, 3, EVENTS))
         events = distinct([e.t for e in trace.run.events])[:most]
         at = keep(t, y, events, self.points - AROUND * len(events))
+        drawn_t, drawn_y = broken(t[at], y[at], floor) if floor else (t[at], y[at])
         look = style(trace, i)
         line = {
-            "type": "scatter", "x": coded(_times(t[at])),
+            "type": "scatter", "x": coded(_times(drawn_t)),
             "name": plain(called(trace)), "meta": label(trace), "mode": "lines",
             "line": {key: look[key] for key in ("color", "dash", "width")} | more,
             "opacity": 0.65 if label(trace) == TRUTH else 1.0,
         }  # fmt: skip
         with np.errstate(over="ignore"):  # what is larger than any plot shows is a gap
-            self.lines.append((row, y[at].astype(np.float32), line))
+            self.lines.append((row, drawn_y.astype(np.float32), line))
 
     def done(self) -> dict[str, Any]:
         """The figure."""
@@ -148,6 +152,21 @@ class Sheet:
                 axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 9, "exponentformat": "power"}
             top += heights[i] + below[i]
         return axes, TOP + inside + BOTTOM
+
+
+def broken(t: Floats, y: Floats, floor: float) -> tuple[Floats, Floats]:
+    """Break a line on a logarithmic axis where it leaps from the floor, or back to it: nothing is known in between.
+
+    A value that is alone stays joined to its neighbours, or nobody would see it, but for a first or last one at the
+    floor, such as the difference at the start.
+    """
+    low = y <= floor
+    starts = np.flatnonzero(low[1:] != low[:-1]) + 1
+    several = np.diff(np.concatenate([[0], starts, [len(y)]])) > 1
+    several[[0, -1]] |= low[[0, -1]]
+    leaps = np.maximum(y[starts], y[starts - 1]) > LEAP * floor
+    at = starts[several[:-1] & several[1:] & leaps]
+    return np.insert(t, at, t[at]), np.insert(y, at, np.nan)
 
 
 def _short(values: NDArray[np.float32]) -> NDArray[np.float32]:

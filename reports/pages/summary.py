@@ -14,6 +14,7 @@ from crossbody.reports.judging.told import share
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
+from crossbody.reports.pages.html import BEYOND
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
 
@@ -69,9 +70,9 @@ def _row(found: Results, who: str, mine: Mapping[str, Sequence[Row]]) -> dict[st
         if row["metric"] == "position" and row["value"] is not None and math.isfinite(row["value"])
     ]  # fmt: skip
     costs = [cost for label in mine if (cost := _cost(found.walls, label, who))]
+    worst = next((word for word in (*grid.RANKED, Word.SKIPPED.value) if words[word]), Word.INFO.value)
     return {
-        "who": who.removesuffix(":"),
-        "worst": next((word for word in (*grid.RANKED, Word.SKIPPED.value) if words[word]), Word.INFO.value),
+        "who": who.removesuffix(":"), "worst": BEYOND if worst == Word.INFO and words[worst] else worst,
         "within": words["within"], "expected": words["expected-outside"] + words["not judged"],
         "outside": words["outside"],
         "skipped": words["skipped"], "error": median(errors) if errors else math.nan,

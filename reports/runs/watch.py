@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 GRACE = 0.6  # time that an interrupted command has to put its things in order, s
 LIMIT = 3660.0
 """Time that one engine may take for one scene, s: what the reference allows itself, and a minute."""
+SLOW = 5.0  # time after which it is told what is being done, s
 TICK = 0.2
 SOON = 0.01  # time after which an interrupt that was swallowed is raised again, s
 _ROOM = 1 << 16
@@ -76,6 +77,12 @@ def limited(label: str, seconds: float | None = None) -> None:
     if _diary is not None:
         seconds = float(str(_diary.read().get("seconds", LIMIT))) if seconds is None else seconds
         _diary.write(label=label, until=time.monotonic() + seconds, seconds=seconds)
+
+
+def doing(text: str) -> None:
+    """Say what begins now, or nothing: what takes long is told on stderr, even while it leaves no thread a turn."""
+    if _diary is not None:
+        _diary.write(doing=text, since=time.monotonic())
 
 
 def stopping() -> bool:
@@ -224,7 +231,7 @@ class _Watch:
 
     def __init__(self, command: Callable[[], int], diary: _Diary) -> None:
         self.command, self.diary = command, diary
-        self.child, self.signalled, self.deadline = 0, 0, 0.0
+        self.child, self.signalled, self.deadline, self.told = 0, 0, 0.0, ""
 
     def wait(self) -> tuple[int, int]:
         """The child's status when it is gone, and the signal by which the user stopped it (0: none)."""
@@ -258,7 +265,11 @@ class _Watch:
 
     def _look(self, _number: int, _frame: FrameType | None) -> None:
         now = time.monotonic()
-        until = float(str(self.diary.read().get("until", 0.0)))
+        said = self.diary.read()
+        until, doing_ = float(str(said.get("until", 0.0))), str(said.get("doing", ""))
+        if doing_ and doing_ != self.told and now - float(str(said.get("since", now))) >= SLOW:
+            self.told = doing_
+            _say(f"{doing_} has taken {SLOW:g} s and goes on.", 0)
         if (self.signalled and now >= self.deadline) or (until and now >= until):
             _end(self.child)
 

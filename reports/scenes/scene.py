@@ -68,15 +68,17 @@ def _moved(pose: Pose, joint: Joint, q: Floats) -> Pose:
 
 
 def stage(p: Parameters) -> Stage:
-    """Return what is drawn of every body."""
+    """Return what is drawn of every body: its shapes, but those inside its boxes, or the box of its inertia."""
     scene = _scene(p)
     if len(scene.bodies) > MOST:
         raise ValueError(f"it has {len(scene.bodies)} bodies; at most {MOST} can be drawn")
     index = {"": -1} | {body.name: i for i, body in enumerate(scene.bodies)}
     shown = {shape.body for shape in scene.shapes}
     boxes = [_inertia_box(body, i) for i, body in enumerate(scene.bodies) if body.name not in shown and body.mass]
+    solids = [_solid(shape, index[shape.body]) for shape in scene.shapes]
+    seen = [solid for solid, shape in zip(solids, scene.shapes, strict=True) if not _hidden(solid, shape, scene.shapes)]
     return Stage(
-        solids=(*(_solid(shape, index[shape.body]) for shape in scene.shapes), *boxes),
+        solids=(*seen, *boxes),
         bones=tuple((index[body.parent], i) for i, body in enumerate(scene.bodies) if body.parent),
         frames=len(scene.bodies),
     )
@@ -180,6 +182,17 @@ def _solid(shape: SceneShape, body: int) -> dict[str, Any]:
     else:
         points = _ball() * size
     return _drawn(np.asarray(shape.position) + points @ turn.T, body, radius, faces)
+
+
+def _hidden(solid: Mapping[str, Any], shape: SceneShape, shapes: Sequence[SceneShape]) -> bool:
+    """Whether a shape is inside a box of its body, such as the ball by which a block touches at one place."""
+    if shape.type == "plane":
+        return False
+    return any(
+        np.all(np.abs((solid["points"] - np.array(box.position)) @ matrices(np.asarray(box.orientation)))
+               + solid["radius"] <= np.asarray(box.size) + 10.0**-FLAT)
+        for box in shapes if box.type == "box" and box.body == shape.body and box is not shape
+    )  # fmt: skip
 
 
 def _sides(corners: Floats) -> tuple[tuple[int, ...], ...]:

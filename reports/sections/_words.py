@@ -62,13 +62,12 @@ ORDERS = columns(
     promised=("Promised order", Kind.NUMBER), says=("Comment", Kind.LONG),
 )  # fmt: skip
 TIMINGS = columns(
-    case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER),
-    against="Against the truth of", tier="Tier", error=("Error", Kind.NUMBER),
-    error_q=("Position", Kind.NUMBER), error_v=("Velocity", Kind.NUMBER),
+    case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER), error=("Error", Kind.NUMBER),
+    median_ms=("Median [ms]", Kind.NUMBER), iqr_ms=("IQR [ms]", Kind.NUMBER), against="Against the truth of",
+    tier="Tier", error_q=("Position", Kind.NUMBER), error_v=("Velocity", Kind.NUMBER),
     error_impulse=("Impulse", Kind.NUMBER), error_energy=("Energy", Kind.NUMBER),
     error_times=("Event times [s]", Kind.NUMBER), error_between=("Position on one grid", Kind.NUMBER),
-    honesty=("Error over tolerance", Kind.NUMBER), median_ms=("Median [ms]", Kind.NUMBER),
-    iqr_ms=("IQR [ms]", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER),
+    honesty=("Error over tolerance", Kind.NUMBER), call_ms=("Whole call [ms]", Kind.NUMBER),
     native_ms=("Its own loop [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
     interpreted=("Interpreted", Kind.LONG), cores=("Cores", Kind.NUMBER),
     repeats=("Repeats", Kind.NUMBER), outcome="Outcome",

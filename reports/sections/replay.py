@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
 
@@ -77,9 +78,10 @@ def sections(out: Path) -> tuple[Section, ...]:
             plots.append(Plot(name=name, figure=draw(left, noise, held), time=True))
     plots += [Plot(name="replay-correlation", figure=figure.correlation(correlated))] if len(correlated) else []
     origin = "SYNTHETIC, no measurement" if about["synthetic"] else "a measurement"
-    text = f"The log {about['file']} is {origin}{about['about'] and ': '}{about['about']}."
-    if not held:  # windows held out of a fit are judged with it
-        text = f"{judged(metrics)} {text}"
+    text = f"The log {about['file']} is {origin}{about['about'] and ': '}{about['about'].rstrip('.')}."
+    if not held:  # windows held out of a fit are judged with it, and where nothing is judged the page begins so
+        said = "" if metrics["limit"].isna().all() else f"{judged(metrics)} "
+        text = f"{said}{explained(metrics)} {text}"
     table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")
     shown = [
         Section(name="replay", title="Log and model", text=text, tables=(table,)),
@@ -89,6 +91,21 @@ def sections(out: Path) -> tuple[Section, ...]:
         table = Table(title="Findings about the log", columns=FINDINGS, rows=records(found), file="findings.csv")
         shown.append(Section(name="replay-log", title="Checks of the log", tables=(table,)))
     return tuple(shown)
+
+
+def explained(metrics: pd.DataFrame) -> str:
+    """Say how much of the motion each engine explains where it explains least, and by how much it is off there."""
+    fits = metrics[(metrics["metric"] == "fit") & metrics["value"].notna()].sort_values("value", kind="stable")
+    largest = metrics[metrics["metric"] == "largest"].set_index(["who", "channel"])["value"]
+    units = metrics[metrics["metric"] == "largest"].set_index(["who", "channel"])["unit"]
+    told: dict[str, list[str]] = {}
+    for who, channel, value in fits.drop_duplicates("who")[["who", "channel", "value"]].itertuples(index=False):
+        off = largest.get((who, channel), math.nan)
+        size = "" if math.isnan(off) else f", off by up to {off:.3g}{unit_text(units[who, channel])}"
+        told.setdefault(f"{value:.3g} % of {channel}{size}", []).append(who)
+    head = "Explained least" if fits["channel"].nunique() > 1 else "Explained"
+    lines = [f"{text} ({', '.join(whom)})" for text, whom in told.items()]
+    return f"{head}: {'; '.join(lines)}." if lines else ""
 
 
 def judged(metrics: pd.DataFrame) -> str:

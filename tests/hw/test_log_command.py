@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import click
 import log_files
 import numpy as np
 import pytest
 
 from crossbody import hw
-from crossbody.reports.cli import main
+from crossbody.reports.cli import cli, main
 
 
 def call(*arguments: str | Path) -> int:
@@ -134,3 +136,45 @@ def test_help_imports_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+SPACE = {"px": "m", "pz": "m", "qw": "1", "qz": "1", "vx": "m/s", "vz": "m/s", "wx": "rad/s", "th1": "rad",
+         "omega": "rad/s", "tau": "N m"}  # fmt: skip
+"""Names of columns and the units that they have."""
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_units_are_drafted_from_names_and_marked_where_the_file_tells_none(
+    seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    draw = np.random.default_rng(seed)
+    names = [str(name) for name in draw.permutation(list(SPACE))]
+    told = {name: draw.random() < 0.4 and SPACE[name] != "1" for name in names}
+    data = {f"{name} [{SPACE[name]}]" if told[name] else name: draw.normal(size=50) for name in names}
+    path = log_files.write("csv", tmp_path, data)
+    assert call("log", "info", path, "--draft") == 0
+    drafted = capsys.readouterr().out
+    marked = re.findall(r'column = "(\w+)"\nunit = "([^"]*)" # guessed', drafted)
+    assert dict(marked) == {name: SPACE[name] for name in names if not told[name]}
+    assert drafted.count("unit = ") == len(marked), "a unit that the file tells is not drafted"
+    assert "sample_time = 1.0 # no measurement: set it" in drafted
+    assert hw.parse_columns(drafted) == hw.survey(path).draft()
+
+
+@pytest.mark.parametrize("name", hw.maps())
+def test_a_map_that_comes_along_is_named_wherever_one_is_asked_for(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = hw.load_columns(name)
+    wanted = {one for one in (columns.time.column, *(s.column for _, _, s in columns.signals())) if one}
+    path = log_files.write("parquet", tmp_path, {one: np.arange(20.0) for one in wanted})
+    assert call("log", "info", path) == 0
+    (said,) = [line for line in capsys.readouterr().out.splitlines() if "comes with crossbody" in line]
+    assert name in said
+    assert call("list") == 0
+    assert f"  {name} " in capsys.readouterr().out
+    assert call("replay", path, "-m", "ball", "--out", tmp_path / "out") == 2
+    assert name in " ".join(capsys.readouterr().err.split())
+    for command in (cli.commands["replay"], cli.commands["identify"], cli.commands["log"].commands["info"]):
+        (option,) = [one for one in command.params if one.name == "columns"]
+        assert name in [item.value for item in option.shell_complete(click.Context(command), name[:4])]

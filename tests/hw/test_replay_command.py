@@ -67,6 +67,28 @@ def test_replay_writes_the_report_with_the_measurement_in_it(
 
 
 @needs_pendulum
+@pytest.mark.parametrize("limit", ["", "fit=90", "fit=99.9999"])
+def test_replay_says_first_what_is_judged_and_how_far_off_every_engine_is(
+    limit: str, short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, asked = tmp_path / "out", ("--limit", limit) if limit else ()
+    assert code("replay", short, "-m", "double_pendulum", "-e", "reference:compiled", "--out", out, *asked) in (0, 1)
+    said = " ".join(capsys.readouterr().out.split())
+    rows = json.loads((out / "replay.json").read_text(encoding="utf-8"))["rows"]
+    fits = {row["channel"]: row["value"] for row in rows if row["metric"] == "fit"}
+    least = min(fits, key=fits.__getitem__)
+    off = next(row["value"] for row in rows if (row["metric"], row["channel"]) == ("largest", least))
+    met = sum(fit >= float(limit.partition("=")[2]) for fit in fits.values()) if limit else 0
+    assert said.startswith(f"{met} of {len(fits)} limits are met." if limit else "Nothing is judged, since no limit")
+    explained = f"Explained least: {fits[least]:.3g} % of {least}, off by up to {off:.3g} rad (reference:compiled)."
+    assert explained in said
+    assert "Speed, in times of real time: reference:compiled" in said
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert explained in page
+    assert page.count("Nothing is judged") == (0 if limit else 1)
+
+
+@needs_pendulum
 def test_replay_speaks_json(short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     asked = ("replay", short, "-m", "double_pendulum", "-e", "reference", "--set", "k1=1e-3", "--json")
     assert code(*asked, "--out", tmp_path / "out") == 0

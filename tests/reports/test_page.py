@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -28,9 +29,9 @@ from crossbody.reports.figures.section import Kind, Plot, Section, Table, column
 from crossbody.reports.figures.styles import COLOURS, DASHES, style
 from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.run_verdicts import Entry
-from crossbody.reports.judging.told import share
+from crossbody.reports.judging.told import QUANTITIES, share
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.verdict import Row, Verdict, Word
+from crossbody.reports.judging.verdict import LACKS, Row, Verdict, Word
 from crossbody.reports.pages import figures, grid, html, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import KeptTemplates, Page, plot
@@ -384,22 +385,30 @@ def test_the_index_counts_what_is_beyond_a_limit_though_it_is_not_judged(
     assert told == ([str(loose)] if loose else [])
 
 
-def test_what_is_farthest_out_stands_first(out: Path) -> None:
-    text = (out / CASE).read_text().replace("<wbr>", "")
-    body = text[text.index('--glance">') :]
-    shown = re.findall(r'<th scope="row">(\w+)', body[body.index("<tbody>") : body.index("</tbody>")])
-    rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if row["verdict"] in grid.WORST]
-    far = {row["metric"]: max(share(each) for each in rows if each["metric"] == row["metric"]) for row in rows}
-    order = [far[name] for name in shown if name in far]
-    assert len(order) > 10
-    assert order == sorted(order, reverse=True)
+@pytest.mark.parametrize("seed", range(30))
+def test_quantities_beyond_their_limits_stand_before_identities_and_counts(seed: int) -> None:
+    """A count that must be exact is no multiple of a limit: it says less than a position that is far off."""
+    rng = np.random.default_rng(seed)
+    tells = {"position": 0, "velocity": 1, "event_times": 1, "law_residual": 2, "rate_residual": 2, "touch_count": 3}
+    times = {str(name): math.inf if name == "touch_count" else 10.0 ** rng.uniform(-3.0, 9.0)
+             for name in rng.permutation(list(tells))}  # fmt: skip
+    rows = [
+        Verdict(
+            case="c", variant="v", engine="e", profile="p", metric=name, value=min(size, 1e9), unit="1",
+            limit=0.0 if size == math.inf else 1.0, tier="A", verdict=Word.EXPECTED if size > 1.0 else Word.WITHIN,
+        ).row() | {"who": "e:p"} for name, size in times.items()
+    ]  # fmt: skip
+    shown = [line.text for line in grid.of_case(rows, "page", "c:v", {})[2:]]
+    assert shown == sorted(times, key=lambda name: (times[name] < 1.0, tells[name], -times[name]))
 
 
-def test_the_index_names_the_number_of_a_case_that_is_farthest_out_of_those_of_the_worst_word(out: Path) -> None:
+def test_the_index_names_the_number_of_a_case_that_tells_most_of_those_of_the_worst_word(out: Path) -> None:
     text = (out / "index.html").read_text().replace("<wbr>", "")
     rows = [row for row in json.loads((out / "verdicts.json").read_text())["rows"] if grid.held(row)]
     worst = min(grid.RANKED.index(row["verdict"]) for row in rows)
-    far = max((row for row in rows if grid.RANKED.index(row["verdict"]) == worst), key=share)
+    of_worst = [row for row in rows if grid.RANKED.index(row["verdict"]) == worst and share(row) > 0.0]
+    far = max(of_worst, key=lambda row: (row["metric"] == "position", row["metric"] in QUANTITIES,
+                                         share(row) < math.inf, share(row)))  # fmt: skip
     named = escape(f"{far['engine']}:{far['profile']}: {far['metric']} {grid.short(far['value'])}")
     assert f"<small>{named}</small>" in text
 
@@ -673,3 +682,57 @@ def test_a_name_that_may_break_is_the_same_name(seed: int) -> None:
     shown = html.breakable(name)
     assert unescape(shown.replace("<wbr>", "")) == name
     assert shown.count("<wbr>") == name.count(":") + name.count("_")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "metric", "why", "said"),
+    [
+        (Word.INFO, "event_times", f"{LACKS} Known: soft.", "no such event"),
+        (Word.INFO, "position", f"{LACKS} Known: soft.", "no number"),
+        (Word.INFO, "position", "Not measured. It would take 55 s.", "not measured"),
+        (Word.EXPECTED, "mode_times", "There is no contact phase.", "no such event"),
+        (Word.OUTSIDE, "velocity", "The value is not finite.", "no number"),
+    ],
+)  # fmt: skip
+def test_a_cell_without_a_number_says_why(verdict: Word, metric: str, why: str, said: str) -> None:
+    def told(metric: str, value: float, who: str, word: Word, why: str) -> Row:
+        engine, _, profile = who.partition(":")
+        return Verdict(case="c", variant="v", engine=engine, profile=profile, metric=metric, value=value, unit="1",
+                       limit=1.0, tier="A", verdict=word, why=why).row() | {"who": who}  # fmt: skip
+
+    rows = [told(metric, math.nan, "a:p", verdict, why), told(metric, 0.5, "b:p", Word.WITHIN, ""),
+            told("own", 0.5, "b:p", Word.WITHIN, ""), told("run", math.nan, "c:p", Word.SKIPPED, "absent")]  # fmt: skip
+    lines = {line.text: [cell.told for cell in line.cells] for line in grid.of_case(rows, "page", "c:v", {"a:p": 1.0})}
+    assert lines[metric] == [said, ""]
+    assert lines["own"] == ["none", ""]
+    assert lines["run time"] == ["", "none"]
+    assert grid.whole("c:v", "page", "c:p", rows[3:], None).told == "not run"
+    assert grid.whole("c:v", "page", "d:p", [], None).told == "not selected"
+    assert html.number(None) == html.number(math.nan) == "none"
+
+
+def test_what_is_the_same_in_every_row_is_said_once_above_the_table() -> None:
+    shown = Table(
+        title="T", columns=columns(case="Case", who="Engine", x=("X", Kind.NUMBER), empty="Empty"),
+        rows=[{"case": "ball:hard", "who": who, "x": 1.0, "empty": ""} for who in ("a:p", "b:p")],
+    )  # fmt: skip
+    assert html.same(shown) == {"Case": "ball:hard"}
+    assert [column.title for column in html.told(shown)] == ["Engine", "X"]
+    alone = replace(shown, rows=shown.rows[:1])
+    assert html.same(alone) == {}
+    assert [column.title for column in html.told(alone)] == ["Case", "Engine", "X"]
+
+
+def test_a_run_far_beyond_a_limit_that_is_not_judged_is_seen_to_be(tmp_path: Path, result: CaseResult) -> None:
+    """It was a grey dot beside ticks."""
+    rows = study.judge([result], {result.case.label: "crossbody run"})
+    rows = [row | {"verdict": Word.WITHIN.value, "value": 0.0, "expected": math.nan, "limit": 1.0} for row in rows]
+    rows = [row | {"verdict": Word.INFO.value, "value": 6e5} if row["metric"] == "position" else row for row in rows]
+    out = made(tmp_path / "out", [result], rows)
+    index, (page,) = (out / "index.html").read_text(), [path.read_text() for path in out.glob("case-*.html")]
+    assert re.search(r'class="cell beyond-not-judged heat-5".*?▲</span>.*? 1 beyond, not judged<', index)
+    assert re.search(
+        r'class="word beyond-not-judged"><span aria-hidden="true">▲</span> <span class="said">beyond', index
+    )
+    assert '<tr data-verdict="not judged" data-beyond' in page
+    assert '▲</span> <span class="said">beyond, not judged' in page

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import chromium
 import numpy as np
@@ -232,6 +233,18 @@ def test_a_plane_that_a_body_carries_is_where_the_body_is(solids: Path, browser:
     assert moved == pytest.approx(wanted, abs=1e-12)
 
 
+EDGE = (
+    "(() => { const c = document.querySelector('.player canvas'); const g = c.getContext('2d');"
+    " const seen = new Set();"
+    " for (const [x, y, w, h] of [[0, 0, c.width, 1], [0, c.height - 1, c.width, 1], [0, 0, 1, c.height],"
+    " [c.width - 1, 0, 1, c.height]])"
+    " new Uint32Array(g.getImageData(x, y, w, h).data.buffer).forEach((p) => seen.add(p));"
+    " const all = new Set(new Uint32Array(g.getImageData(0, 0, c.width, c.height).data.buffer));"
+    " return [seen.size, all.size]; })()"
+)
+"""How many colours are on the edge of the picture, and in it."""
+
+
 def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium.Browser) -> None:
     """Nothing but the ground is on the edge of the picture."""
     rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, 0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
@@ -240,21 +253,42 @@ def test_a_scene_has_room_however_it_is_turned(tmp_path: Path, browser: chromium
     case = from_scene(Scene(bodies=(rod,), joints=(hinge,), shapes=(shape,)), q0=[0.1], t_end=0.5)
     browser.open(page_of(case, tmp_path / "out"))
     browser.js("document.querySelector('.player').scrollIntoView()")
-    edge = (
-        "(() => { const c = document.querySelector('.player canvas'); const g = c.getContext('2d');"
-        " const seen = new Set();"
-        " for (const [x, y, w, h] of [[0, 0, c.width, 1], [0, c.height - 1, c.width, 1], [0, 0, 1, c.height],"
-        " [c.width - 1, 0, 1, c.height]])"
-        " new Uint32Array(g.getImageData(x, y, w, h).data.buffer).forEach((p) => seen.add(p));"
-        " const all = new Set(new Uint32Array(g.getImageData(0, 0, c.width, c.height).data.buffer));"
-        " return [seen.size, all.size]; })()"
-    )
     for key in ("", "ArrowLeft", "ArrowUp", "ArrowUp", "ArrowUp", "ArrowUp", "ArrowLeft"):
         press = f"new KeyboardEvent('keydown', {{key: '{key}'}})"
         browser.js(f"document.querySelector('.player canvas').dispatchEvent({press})")
         browser.js(NEXT_FRAME)
-        at_edge, drawn = browser.js(edge)
+        at_edge, drawn = browser.js(EDGE)
         assert at_edge == 1
+        assert drawn > 10
+
+
+@pytest.mark.parametrize("followed", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_larger_differences_are_in_the_picture(
+    tmp_path: Path, browser: chromium.Browser, seed: int, followed: bool
+) -> None:
+    """A run that is off by a part of its body is out of a picture of the truth when that is drawn a hundred times."""
+    rng = np.random.default_rng(seed)
+    body = Body(name="box", mass=1.0, inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0))
+    shape = Shape(name="box", body="box", type="box", size=(0.1, 0.2, 0.3))
+    scene = Scene(bodies=(body,), joints=(Joint(name="free", body="box", type="free"),), shapes=(shape,))
+    case = from_scene(scene, q0=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], t_end=0.2)
+    run = load_engine("reference").prepare(case, "compiled").run()
+    off = np.zeros(7)
+    off[:3] = 0.02 * (v := rng.normal(size=3)) / np.linalg.norm(v)
+    moved = replace(run, q=run.q + (run.t / run.t[-1])[:, None] * off)
+    given = SimpleNamespace(engine="fake", profile="moved", run=lambda: moved)
+    browser.open(page_of(case, tmp_path / "out", given))
+    browser.js("document.querySelector('.player').scrollIntoView()")
+    browser.js(f"if ({str(followed).lower()}) document.querySelector('[data-follow]').click()")
+    browser.js("document.querySelector('[data-clock]').value = 1000")
+    browser.js("document.querySelector('[data-clock]').dispatchEvent(new Event('input'))")
+    for factor in ("1", "10", "100"):
+        browser.js(f"document.querySelector('[data-differences]').value = '{factor}'")
+        browser.js("document.querySelector('[data-differences]').dispatchEvent(new Event('change'))")
+        browser.js(NEXT_FRAME)
+        at_edge, drawn = browser.js(EDGE)
+        assert at_edge == 1, factor
         assert drawn > 10
 
 
@@ -584,3 +618,24 @@ def test_one_goes_from_case_to_case_and_back_to_the_sections(tmp_path: Path, bro
     browser.js("document.querySelector('.engines a').click()")
     browser.wait("document.querySelector('.inside').getBoundingClientRect().top >= 0 && scrollY < 300")
     assert browser.complaints() == []
+
+
+def test_timings_and_names_of_rungs_are_read_on_a_narrow_screen(whole: Path, browser: chromium.Browser) -> None:
+    """Setting, error and time stand beside each other; what goes on to the right can be scrolled to."""
+    (page,) = [path for path in whole.glob("*.html") if "Timings" in path.read_text()][:1]
+    browser.open(page, width=400)
+    draw_all(browser)
+    seen = browser.js(
+        "(() => { const table = [...document.querySelectorAll('details.table')].find((one) =>"
+        " one.querySelector('summary').textContent.startsWith('Timings'));"
+        " const end = table.querySelector('.scroll').getBoundingClientRect().right;"
+        " return [...table.querySelectorAll('th')].filter((head) => head.getBoundingClientRect().right <= end)"
+        ".map((head) => head.textContent); })()"
+    )
+    assert {"Value", "Error", "Median [ms]"} <= set(seen)
+    rungs = browser.js(
+        "[...document.querySelectorAll('.plot .textpoint text')].map((text) =>"
+        " [text.textContent, parseFloat(getComputedStyle(text).fontSize), text.getBoundingClientRect().toJSON()])"
+    )
+    assert rungs
+    assert min(size for _, size, _ in rungs) >= 11.0

@@ -18,7 +18,7 @@ from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.figures import MOST_SIGNALS, carrying, force, motion, note, penetration, plots
 from crossbody.reports.pages.friction import hysteresis
-from crossbody.reports.pages.sheet import off_scale
+from crossbody.reports.pages.sheet import broken, off_scale
 from crossbody.reports.runs import study
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.runs.jobs import run_case
@@ -50,9 +50,7 @@ def test_the_area_of_the_loop_is_the_energy_that_the_contact_lost(run: Trajector
     (section,) = hysteresis([trace(run)])
     (line,) = section.plots[0].figure["data"]
     x, y = numbers(line["x"]), numbers(line["y"])
-    ends = np.flatnonzero(np.isnan(x))
-    blows = [slice(a, b) for a, b in zip([0, *(ends + 1)], [*ends, len(x)], strict=True) if b > a + 1]
-    area = sum(np.trapezoid(y[blow], x[blow]) for blow in blows)
+    area = np.trapezoid(y, x)
     assert run.ledger is not None
     lost = -(run.ledger.contact[-1, 0] - run.ledger.contact[0, 0])
     assert lost > 0.1
@@ -72,10 +70,30 @@ def test_a_force_beyond_the_plot_is_named(run: Trajectory) -> None:
     calm = force([trace(run), trace(replace(run, lam=1.2 * run.lam), "calm")])
     assert "Off scale" not in calm["layout"]["title"]["text"]
     assert "range" not in calm["layout"]["yaxis"]
-    (section,) = hysteresis([trace(run), trace(replace(run, lam=100.0 * run.lam), "wild")])
-    shape = section.plots[0].figure["layout"]
-    assert shape["yaxis"]["range"] == drawn["layout"]["yaxis"]["range"]
-    assert shape["title"]["text"].endswith(f"Off scale: wild:p up to {100.0 * top:.3g} N (floor)")
+
+
+@pytest.mark.parametrize("times", [1.0, 100.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_loop_is_whole(seed: int, times: float) -> None:
+    """From the surface without a force to the largest and back, of every contact and however strong it is."""
+    draw = np.random.default_rng(seed)
+    phase = np.linspace(0.0, 6.0 * np.pi, 400) + draw.uniform(0.3, 2.0)
+    depth, damped = np.sin(phase), np.sin(phase) + 0.3 * np.cos(phase)
+    lam = np.where(depth > 0.0, times * np.maximum(damped, 0.0), 0.0)
+    made = Trajectory(
+        t=phase, q=-depth[:, None], v=0.0 * depth[:, None], gap=-depth[:, None], lam=lam[:, None],
+        energy=np.ones((400, 2)), mode=np.where(lam > 0.0, 1, 0)[:, None].astype(np.int8),
+    )  # fmt: skip
+    weak = replace(made, lam=made.lam / times)
+    (section,) = hysteresis([trace(weak), trace(made, "strong")])
+    figure = section.plots[0].figure
+    assert "range" not in figure["layout"]["yaxis"]
+    x, y = (numbers(figure["data"][1][axis]) for axis in "xy")
+    assert y.max() == pytest.approx(lam.max())
+    assert np.isfinite(x).all(), "nothing is broken where both depth and force are known"
+    for i in np.flatnonzero((y[1:] > 0.0) != (y[:-1] > 0.0)):
+        touch = i if y[i] == 0.0 else i + 1
+        assert x[touch] == 0.0
 
 
 @pytest.mark.parametrize("times", [1.6, 3.9])
@@ -270,3 +288,48 @@ def test_a_force_of_rounding_in_the_truth_sets_neither_scale_nor_limit(run: Traj
     (limit,) = drawn["layout"]["shapes"]
     weight = 9.81 * 1.0  # of the ball, which a thousandth counts as none
     assert limit["y0"] > 1e-6 * 1e-4 * weight * float(run.t[-1])
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_line_on_a_logarithmic_axis_crosses_no_decades_from_the_floor_and_loses_no_sample(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    floor, t = 1e-16, np.arange(200.0)
+    level = np.repeat(draw.choice([1e-18, 3e-16, 1e-9, 1e-3], 20), draw.multinomial(180, np.full(20, 0.05)) + 1)
+    y = np.maximum(level * draw.uniform(0.5, 2.0, 200), floor)
+    y[0] = floor
+    low = y <= floor
+
+    def leaps(i: int) -> bool:
+        """Whether between this sample and the next a line would join what is cut off and what is seen."""
+        before = low[i - 1] == low[i] if i else low[0]
+        after = low[i + 2] == low[i + 1] if i + 2 < len(y) else low[-1]
+        return bool(low[i] != low[i + 1] and max(y[i], y[i + 1]) > 100.0 * floor and before and after)
+
+    bx, by = broken(t, y, floor)
+    seen = np.isfinite(by)
+    assert (bx[seen] == t).all()
+    assert (by[seen] == y).all()
+    gaps = np.flatnonzero(~seen) - np.arange((~seen).sum()) - 1
+    assert gaps.tolist() == [i for i in range(len(y) - 1) if leaps(i)]
+    assert len(gaps) > 0
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_coordinates_at_rest_are_named_and_not_drawn(run: Trajectory, seed: int) -> None:
+    """An axis of rounding noise says nothing; but one that any engine moves is drawn."""
+    draw = np.random.default_rng(seed)
+    limit, rests = 1e-6, draw.random(3) < 0.5
+    names = [f"rests {k}" if rest else f"moves {k}" for k, rest in enumerate(rests)]
+    q = np.concatenate([run.q, *(0.9 * limit * draw.random((len(run.t), 1)) for _ in names)], axis=1)
+    moved = q + np.where(np.r_[False, rests], 0.0, 3.0 * limit) * np.sin(run.t)[:, None]
+    about = {"coordinates": [{"name": name, "unit": "m"} for name in ("height", *names)], "scales": [1.0] * 4}
+    traces = [trace(replace(run, q=q)), trace(replace(run, q=np.where(np.r_[True, rests], q, moved)), "fake")]
+    traces = [replace(one, about=one.about | about, truth=traces[0].run) for one in traces]
+    titles = "".join(title for one in plots("motion", traces, limits={"position": {limit: "limit"}})
+                     for title in axis_titles(one.figure))  # fmt: skip
+    assert [name in titles for name in ("height", *names)] == [True, *~rests]
+    told = note("motion", traces, {"position": {limit: "limit"}})
+    named = ", ".join(name for name, rest in zip(names, rests, strict=True) if rest)
+    assert told.endswith(f"At rest in every run, to within the limit: {named}." if named else "ends is drawn.")
+    alone = [replace(one, run=replace(one.run, q=0.0 * q), truth=None) for one in traces]
+    assert plots("motion", alone, limits={"position": {limit: "limit"}}), "what rests as a whole is the motion"

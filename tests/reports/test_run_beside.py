@@ -94,7 +94,7 @@ def test_the_missing_cases_run_the_largest_first_and_each_is_told_by_its_name(mo
         return 7
 
     monkeypatch.setattr(watch, "beside", beside)
-    monkeypatch.setattr(command, "progress", lambda total: nullcontext(shown.append))
+    monkeypatch.setattr(command, "progress", lambda total, done: nullcontext(shown.append))
     assert command._beside(some, there, lambda i: done.append(i) or 0, 2) == 1
     assert done == [3, 0, 2]
     assert shown == [some[i].label for i in done]

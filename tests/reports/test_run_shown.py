@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 
 import click
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -178,8 +179,8 @@ def test_a_number_that_is_none_is_not_written_as_one(capsys: pytest.CaptureFixtu
     rows = [row("mujoco", "friction_power", math.nan, Word.OUTSIDE), row("mujoco", "x", math.nan, Word.OUTSIDE, 1e-6)]
     run_shown.show(rows, {})
     said = " ".join(capsys.readouterr().out.split())
-    assert "outside: ball:v mujoco:matched friction_power has no number. the reason" in said
-    assert "outside: ball:v mujoco:matched x has no number, limit 1e-06. the reason" in said
+    assert "outside: ball:v mujoco:matched friction_power has no number outside:" in said
+    assert "outside: ball:v mujoco:matched x has no number, limit 1e-06 The reason of these 2: the reason" in said
 
 
 @pytest.mark.parametrize("place", range(60))
@@ -198,3 +199,27 @@ def test_sentences_fit_80_columns_and_keep_every_word(words: list[str]) -> None:
         assert all(len(line) <= 80 or len(line.split()) == 1 for line in lines)
         assert " ".join(lines).split() == words
         assert all(line.startswith("    ") for line in lines[1:])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_reason_is_told_once_behind_all_numbers_that_have_it(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    reasons = [f"because {k}." for k in range(3)]
+    rows = [
+        row(who, f"metric_{k}", draw.uniform(2.0, 9.0), Word.OUTSIDE, 1.0) | {"why": str(draw.choice(reasons))}
+        for who in ("a", "b") for k in range(5)
+    ]  # fmt: skip
+    lines = run_shown.wrong(runs_of(rows))
+    assert sum(line.startswith("outside: ") for line in lines) == len(rows)
+    seen = list[str]()
+    for line in lines:
+        seen.append(" ".join(line.split(". because")[0].split()[2:4]))
+        why = next((one for one in reasons if one in line), "")
+        if not why:
+            continue
+        mine = [f"{one['engine']}:matched {one['metric']}" for one in rows if one["why"] == why]
+        told = seen if line.startswith("outside") else seen[:-1]
+        assert sorted(told) == sorted(mine)
+        assert line.startswith("outside") or f"these {len(mine)}:" in line
+        seen = []
+    assert sum(line.count("because") for line in lines) == len({one["why"] for one in rows})

@@ -12,6 +12,7 @@ from random_scenes import random_scene, random_state
 from scenes import compiled, rows_at
 from scipy.spatial.transform import Rotation
 
+from crossbody import cases
 from crossbody.cases.files.case import case_of, quaternions
 from crossbody.cases.rotations import rates
 from crossbody.cases.scene import Body, Scene, Shape
@@ -211,3 +212,33 @@ def test_no_body_is_drawn_as_nothing(seed: int) -> None:
     (solid,) = picture.stage(told(Scene(bodies=(body,)))).solids
     assert 1000.0 * 4.0 / 3.0 * np.pi * solid["radius"] ** 3 == pytest.approx(mass)
     np.testing.assert_allclose(solid["points"], [com], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_a_box_of_its_body_holds_is_not_drawn_and_all_else_is(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    turn = tuple(Rotation.random(rng=draw).as_quat())
+    box = Shape(name="box", body="ball", type="box", size=tuple(draw.uniform(0.2, 0.4, 3)),
+                position=tuple(draw.normal(size=3)), orientation=turn)  # fmt: skip
+    ways = np.array([box.orientation[k] for k in (1, 2, 3, 0)])
+    held, out = (
+        Shape(name=name, body="ball", size=(0.05, 0.0, 0.0), position=tuple(
+            np.array(box.position) + Rotation.from_quat(ways).apply((np.array(box.size) - 0.05) * (1.0, -1.0, 1.0) * by)
+        )) for name, by in (("held", draw.uniform(0.0, 1.0)), ("out", draw.uniform(1.01, 2.0)))
+    )  # fmt: skip
+    seen = picture.stage(told(BALL.replace(shapes=(box, held, out)))).solids
+    assert [(len(solid["points"]), solid["radius"]) for solid in seen] == [(8, 0.0), (1, 0.05)]
+
+
+@pytest.mark.parametrize(
+    ("name", "variant", "body"),
+    [*(("sliding_block", variant, "block") for variant in ("stops", "turns", "flat")),
+     ("block_on_belt", "", "block"), ("held_weight", "", "weight"), ("held_weight", "sprung", "weight")],
+)  # fmt: skip
+def test_a_block_is_drawn_as_a_block(name: str, variant: str, body: str) -> None:
+    """A ball by which it touches at one place is what engines compute, and not what a reader looks for."""
+    case = cases.load(name, variant or cases.variants(name)[0])
+    solids = picture.stage({"scene": study._about(case, "truth", "")["scene"]}).solids
+    number = [one.name for one in case.scene.bodies].index(body)
+    (solid,) = [one for one in solids if one["body"] == number and "plane" not in one]
+    assert len(solid["points"]) == 8

@@ -77,7 +77,7 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
     assert not deviating or deviating[1] in ("The run", str(len(by["expected"])))
     if most := max(by["expected"], key=times.__getitem__, default=None):
         size = f"position {times[most] * 1e-3:.2g}, {times[most]:.2g} times its limit"
-        assert f"The largest deviation: {most} on ball:hard ({size}): Soft contacts. " in f"{text} "
+        assert f"The largest deviation of position: {most} on ball:hard ({size}): Soft contacts. " in f"{text} "
     for kind, begin in (("outside", "Off:"), ("unbounded", "Beyond a limit for a known cause, and not judged:")):
         farthest = sorted(by[kind], key=lambda who: -times[who])
         assert named(text, begin) == (farthest[:NAMED], max(len(farthest) - NAMED, 0))
@@ -134,3 +134,16 @@ def test_the_sentence_and_the_pages_count_the_same_runs(seed: int) -> None:
         assert int(count[1]) == within
     if "all within" in pages_grid.verdict(told):
         assert not {"expected", "outside", "unbounded"} & set(kinds)
+
+
+def test_the_sentence_says_of_what_the_largest_deviation_is_and_relative_to_what() -> None:
+    rows = [
+        row("one:p", Word.EXPECTED, "touch_count", value=231.0, limit=0.0, why=CAUSE),
+        row("one:p", Word.EXPECTED, value=0.034, why=CAUSE, where="x by 0.0084 m at 1 s"),
+        row("two:p", Word.OUTSIDE, "touch_count", value=3.0, limit=0.0),
+        row("two:p", Word.OUTSIDE, "event_times", value=0.5, unit="s"),
+    ]
+    text = sentence(runs_of(rows))
+    assert "The largest deviation of position: one:p on ball:hard (position 0.034 of its largest value" in text
+    assert "34 times its limit: x by 0.0084 m at 1 s): Soft contacts." in text
+    assert "Off: two:p on ball:hard (event_times 0.5 s, 5e+02 times its limit)" in text

@@ -71,7 +71,8 @@ def test_quiet_says_nothing_where_nothing_is_wrong_and_that_alone_else(capsys: p
     assert call(*RUN, "-q", "--set-engine", "dt=4e-3") == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines
-    assert all(line.startswith(("outside: bouncing_ball:linear mujoco:matched ", "    ")) for line in lines)
+    begun = ("outside: bouncing_ball:linear mujoco:matched ", "The reason of these ", "    ")
+    assert all(line.startswith(begun) for line in lines)
     assert max(map(len, lines)) <= 80
 
 
@@ -173,3 +174,25 @@ def test_json_is_whole_where_nobody_listens_to_errors(tmp_path: Path) -> None:
     done = subprocess.run(["sh", "-c", command], cwd=tmp_path, stdout=subprocess.PIPE, timeout=60)
     assert done.returncode == 0
     assert json.loads(done.stdout)
+
+
+SLEEPS = """
+import sys, time
+from crossbody.reports import voice
+from crossbody.reports.runs import watch
+watch.SLOW = 0.3
+def work():
+    with voice.progress(3) as tell:
+        for name, seconds in (("short", 0.0), ("long", 1.2), ("last", 0.0)):
+            tell(name)
+            time.sleep(seconds)
+    time.sleep(0.7)
+    return 0
+sys.exit(watch.watched(work))
+"""
+
+
+def test_what_takes_long_is_told_once_where_stderr_is_no_terminal() -> None:
+    """Compiled code gives no other thread a turn: it is the process beside it that says so."""
+    found = subprocess.run([sys.executable, "-c", SLEEPS], capture_output=True, text=True, timeout=60, check=True)
+    assert found.stderr == "crossbody: long has taken 0.3 s and goes on.\n"

@@ -26,6 +26,7 @@ GRIP, LIFTED, FINGER = 0.0625, 0.25, 0.125
 """Of fingers: half the width held, m, to which a radius adds without rounding; height, m; mass, kg."""
 UNEVEN = 0.25  # how much more than half of both springs' force the left one has, which a loop passes to the right
 FLOOR = Shape(name="floor", type="plane")
+WEIGHT = Shape(name="box", body="weight", type="box", size=(GRIP, GRIP, LIFTED))
 
 
 def law(p: Mapping[str, float]) -> RowLaw:
@@ -52,13 +53,19 @@ def block(name: str, half: Vector, mass: float = MASS, height: float = 0.0) -> B
     return Body(name=name, mass=mass, inertia=(*inertia, 0.0, 0.0, 0.0), position=(0.0, 0.0, height))
 
 
+def touching_block(radius: float) -> tuple[Shape, Shape]:
+    """Return the ball by which a block that never turns touches at one place, and the box that is seen."""
+    sides = (2.0 * radius, 1.5 * radius, radius)
+    ball = Shape(name="block", body="block", size=(radius, 0.0, 0.0))
+    return ball, Shape(name="box", body="block", type="box", size=sides)
+
+
 def point_on_floor(p: Mapping[str, float], radius: float) -> Scene:
-    """Return a body that never turns and touches at one place: a ball on three slides."""
+    """Return a block that never turns and touches at one place: a ball on three slides, in a box for the eye."""
     return Scene(
         bodies=(Body(name="block", mass=MASS, position=(0.0, 0.0, radius)),),
         joints=tuple(Joint(name=name, body="block", type="slide", axis=axis) for name, axis in SLIDES),
-        shapes=(FLOOR, Shape(name="block", body="block", size=(radius, 0.0, 0.0))),
-        pairs=(pair("floor", "block", p["mu"], law(p)),),
+        shapes=(FLOOR, *touching_block(radius)), pairs=(pair("floor", "block", p["mu"], law(p)),),
         gravity=field(p, p["slope"]),
     )  # fmt: skip
 
@@ -84,7 +91,7 @@ def block_on_belt(p: Mapping[str, float]) -> Scene:
     return Scene(
         bodies=(Body(name="block", mass=MASS, position=(0.0, 0.0, r)),),
         joints=tuple(Joint(name=name, body="block", type="slide", axis=axis) for name, axis in SLIDES[::2]),
-        shapes=(replace(FLOOR, name="belt"), Shape(name="block", body="block", size=(r, 0.0, 0.0))),
+        shapes=(replace(FLOOR, name="belt"), *touching_block(r)),
         pairs=(pair("belt", "block", p["mu"], law(p)),), actuators=(spring,), gravity=field(p),
     )  # fmt: skip
 
@@ -145,7 +152,7 @@ def gripper(p: Mapping[str, float]) -> Scene:
             *(Joint(name=name, body="weight", type="slide", axis=axis) for name, axis in SLIDES[::2]),
             *(Joint(name=name, body=name, type="slide", axis=(1.0, 0.0, 0.0)) for name, _ in sides),
         ),
-        shapes=(*planes, *(Shape(name=name, body=name, size=(r, 0.0, 0.0)) for name, _ in sides)),
+        shapes=(WEIGHT, *planes, *(Shape(name=name, body=name, size=(r, 0.0, 0.0)) for name, _ in sides)),
         pairs=tuple(pair(f"side {name}", name, p["mu"], law(p)) for name, _ in sides),
         pushes=tuple(Push(name=f"on {name}", body=name) for name, _ in sides), gravity=field(p),
     )  # fmt: skip
@@ -159,7 +166,7 @@ def _sprung(scene: Scene, p: Mapping[str, float]) -> Scene:
     return replace(
         scene, pushes=(),
         joints=(x, z, replace(left, stiffness=(k, 0.0, 0.0), rest=(more,)), right),
-        shapes=(Shape(name="box", body="weight", type="box", size=(GRIP, GRIP, LIFTED)), *scene.shapes[2:]),
+        shapes=(WEIGHT, *scene.shapes[3:]),
         pairs=(
             pair("left", "box", p["mu"], law(p)), pair("box", "right", p["mu"], law(p)),
             pair("left", "right", 0.0, law(p)),  # which never meet

@@ -35,60 +35,7 @@
     const solids = stage.frames > 0; // bodies with shapes; otherwise points that are joined by lines
     const [fixed, moving] = [false, true].map((moves) => stage.solids.filter((s) => !s.plane && s.body >= 0 === moves));
 
-    // What one scene spans: all points of all tracks and what stands still; outliers of a run that diverged are left out.
-    const spans = () => {
-      const values = [[], [], []];
-      const add = (p) => p.forEach((x, k) => { if (Number.isFinite(x)) values[k].push(x); });
-      fixed.forEach((solid) => solid.points.forEach(add));
-      const reach = stage.bodies.map((shapes) => Math.max(0, ...shapes.flatMap((s) =>
-        s.circle ? [Math.hypot(s.circle[0], s.circle[1]) + s.circle[2]] : s.points.map((p) => Math.hypot(...p)))));
-      const lead = tracks.filter((track) => track.truth);
-      for (const track of lead.length ? lead : tracks) {
-        const step = Math.max(1, Math.floor(track.t.length / (solids ? 40 : 150)));
-        for (let i = 0; i < track.t.length; i += step) {
-          if (solids) {
-            const pose = (k) => track.poses[i * track.width + k];
-            for (const solid of moving) crossbody.solids.extent(pose, solid).forEach(add);
-          }
-          for (let k = 0; !solids && k < track.width; k += 3) {
-            const p = track.poses.subarray(i * track.width + k, i * track.width + k + 3);
-            if (space) add([...p]);
-            else for (const side of [-1, 1]) add([p[0] + side * reach[k / 3], p[1] + side * reach[k / 3]]);
-          }
-        }
-      }
-      for (const shape of stage.still) (shape.points || []).forEach((p) => add(p));
-      for (const thread of stage.threads) add(thread.slice(0, 2));
-      return values.map((each) => each.reduce(([a, b], x) => [Math.min(a, x), Math.max(b, x)], [Infinity, -Infinity]));
-    };
     const lead = tracks.find((track) => track.truth);
-    // Diameter seen from above, and height: what a camera that goes round and over it must have room for.
-    const across = ([x, y, z]) => [Math.hypot(x[1] - x[0], y[1] - y[0]), z[1] - z[0]];
-    const centre = (boxes) => boxes.map(([a, b]) => (a + b) / 2);
-    const range = spans();
-    let [middle, size] = [centre(range), space ? across(range) : [0, 0]];
-    // What the bodies span at one instant: one that goes far is followed, or nobody would see it.
-    const standing = (t) => {
-      const pose = at(lead || tracks[0], t).pose;
-      const points = moving.flatMap((solid) => crossbody.solids.extent(pose, solid));
-      return [0, 1, 2].map((k) => points.reduce(([a, b], p) => [Math.min(a, p[k]), Math.max(b, p[k])], [Infinity, -Infinity]));
-    };
-    const [whole, wide] = [middle, size];
-    const aim = () => {
-      [middle, size] = [whole, wide];
-      if (!follow?.checked) return;
-      const boxes = standing(now);
-      [middle, size] = [centre(boxes), across(boxes).map((x) => 1.3 * x)];
-    };
-    const larger = () => (differences && lead ? Number(differences.value) : 1);
-    // A pose with its difference to the truth's made larger: of bodies with shapes where they are, not how they are turned.
-    const pose = (track, t) => {
-      const [mine, factor] = [at(track, t), larger()];
-      if (factor === 1 || track === lead) return mine;
-      const true_ = at(lead, t).pose;
-      const moved = (k) => true_(k) + factor * (mine.pose(k) - true_(k));
-      return { ...mine, pose: (k) => (solids && k % 9 > 2 ? mine.pose(k) : moved(k)) };
-    };
     const at = (track, t) => {
       const times = track.t;
       let [low, high] = [0, times.length - 1];
@@ -102,7 +49,59 @@
       const row = share < 1 ? low : high; // what has been, so that no force is seen before its touch
       return { pose: mix, pushes: track.arrows.subarray(row * track.pushes, (row + 1) * track.pushes) };
     };
-
+    const larger = () => (differences && lead ? Number(differences.value) : 1);
+    // A pose with its difference to the truth's made larger: of bodies with shapes where they are, not how they are turned.
+    const pose = (track, t) => {
+      const [mine, factor] = [at(track, t), larger()];
+      if (factor === 1 || track === lead) return mine;
+      const true_ = at(lead, t).pose;
+      const moved = (k) => true_(k) + factor * (mine.pose(k) - true_(k));
+      return { ...mine, pose: (k) => (solids && k % 9 > 2 ? mine.pose(k) : moved(k)) };
+    };
+    // Whose motion the view has room for: the truth's, for a run that diverged would shrink it; and of larger differences all.
+    const fitted = () => {
+      const shown = larger() > 1 ? tracks.filter((track) => crossbody.shown(track.name)) : [];
+      return shown.length ? shown : lead ? [lead] : tracks;
+    };
+    const around = (points) => {
+      const found = [0, 1, 2].map(() => [Infinity, -Infinity]);
+      for (const p of points) {
+        for (let k = 0; k < p.length; k += 1) {
+          if (Number.isFinite(p[k])) found[k] = [Math.min(found[k][0], p[k]), Math.max(found[k][1], p[k])];
+        }
+      }
+      return found;
+    };
+    const reach = stage.bodies.map((shapes) => Math.max(0, ...shapes.flatMap((s) =>
+      s.circle ? [Math.hypot(s.circle[0], s.circle[1]) + s.circle[2]] : s.points.map((p) => Math.hypot(...p)))));
+    // Points that bodies reach at one instant.
+    const reached = (track, t) => {
+      const posed = pose(track, t).pose;
+      if (solids) return moving.flatMap((solid) => crossbody.solids.extent(posed, solid));
+      return Array.from({ length: track.width / 3 }, (_, k) => [posed(3 * k), posed(3 * k + 1), posed(3 * k + 2)]).flatMap((p, k) =>
+        (space ? [p] : [-1, 1].map((side) => [p[0] + side * reach[k], p[1] + side * reach[k]])));
+    };
+    const spans = () => around([
+      ...fixed.flatMap((solid) => solid.points), ...stage.still.flatMap((shape) => shape.points || []),
+      ...stage.threads.map((thread) => thread.slice(0, 2)),
+      ...fitted().flatMap((track) => {
+        const step = Math.max(1, Math.floor(track.t.length / (solids ? 40 : 150)));
+        return [...track.t].filter((_, i) => i % step === 0).flatMap((t) => reached(track, t));
+      }),
+    ]);
+    // Diameter seen from above, and height: what a camera that goes round and over it must have room for.
+    const across = ([x, y, z]) => [Math.hypot(x[1] - x[0], y[1] - y[0]), z[1] - z[0]];
+    const centre = (boxes) => boxes.map(([a, b]) => (a + b) / 2);
+    let range, middle, size;
+    const fit = () => { range = spans(); };
+    fit();
+    // What the bodies span at one instant: one that goes far is followed, or nobody would see it.
+    const standing = (t) => around(fitted().flatMap((track) => reached(track, t)));
+    const aim = () => {
+      const boxes = follow?.checked ? standing(now) : range;
+      middle = centre(boxes);
+      size = space ? across(boxes).map((x) => (follow?.checked ? 1.3 : 1) * x) : [0, 0];
+    };
     const camera = (x0, y0, w, h) => {
       if (!space) {
         const [wide, tall] = [range[0][1] - range[0][0] || 1, range[1][1] - range[1][0] || 1];
@@ -318,7 +317,7 @@
       else redraw();
     };
 
-    if (follow && moving.length) follow.checked = Math.hypot(...wide) > FAR * Math.hypot(...across(standing(0)));
+    if (follow && moving.length) follow.checked = Math.hypot(...across(range)) > FAR * Math.hypot(...across(standing(0)));
     const usual = nice((end || 1) / 10);
     for (const factor of [0.01, 0.1, 0.2, 0.5, 1, 2, 5]) {
       const option = new Option(`${shortNumber(usual * factor)} × real time`, usual * factor, factor === 1, factor === 1);
@@ -330,6 +329,8 @@
     const step = (found) => { if (found !== undefined) { run(false); seek(found, true); } };
     before.addEventListener("click", () => step(scene.events.findLast((t) => t < now - close)));
     after.addEventListener("click", () => step(scene.events.find((t) => t > now + close)));
+    differences?.addEventListener("change", fit);
+    crossbody.on("engines", fit);
     [view, forces, longer, axes, differences, follow].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
     const look = (right, down, closer = 1) => {
       if (space) [turn, tilt] = [turn + right, Math.min(1.5, Math.max(-1.5, tilt + down))];
