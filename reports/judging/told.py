@@ -138,8 +138,9 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         text += f" The largest deviation of {row['metric']}: {_off(run, row)}: {cause[:1].upper()}{cause[1:]}."
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
-    if off:
-        text += f" Off: {_named([_off(run, run.wrong[0]) for run in off])}."
+    for said, of_truth in (("Off", False), ("In doubt", True)):
+        some = [_off(run, run.wrong[0]) for run in off if run.who.startswith(TRUTH) == of_truth]
+        text += f" {said}: {_named(some)}." if some else ""
     if loose:
         loose.sort(key=lambda one: -share(one[1]))
         text += f" Beyond a limit for a known cause, and not judged: {_named([_off(*one) for one in loose])}."

@@ -147,3 +147,11 @@ def test_the_sentence_says_of_what_the_largest_deviation_is_and_relative_to_what
     assert "The largest deviation of position: one:p on ball:hard (position 0.034 of its largest value" in text
     assert "34 times its limit: x by 0.0084 m at 1 s): Soft contacts." in text
     assert "Off: two:p on ball:hard (event_times 0.5 s, 5e+02 times its limit)" in text
+
+
+def test_a_truth_in_doubt_is_no_run_that_is_off() -> None:
+    """What engines are held against stands apart from them: all may be within its limits."""
+    rows = [row("reference:compiled", Word.WITHIN), row("truth:", Word.OUTSIDE, "truth", value=1.0)]
+    said = told.sentence(told.runs_of(rows))
+    assert said.startswith("The run is within all limits. In doubt: truth on ")
+    assert "Off" not in said
