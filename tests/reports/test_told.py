@@ -152,6 +152,6 @@ def test_the_sentence_says_of_what_the_largest_deviation_is_and_relative_to_what
 def test_a_truth_in_doubt_is_no_run_that_is_off() -> None:
     """What engines are held against stands apart from them: all may be within its limits."""
     rows = [row("reference:compiled", Word.WITHIN), row("truth:", Word.OUTSIDE, "truth", value=1.0)]
-    said = told.sentence(told.runs_of(rows))
+    said = sentence(runs_of(rows))
     assert said.startswith("The run is within all limits. In doubt: truth on ")
     assert "Off" not in said
