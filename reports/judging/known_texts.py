@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +15,6 @@ from crossbody.reports.judging.known_figures import drawn
 from crossbody.reports.judging.made_up_traces import axis
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid, index_page, precision, summary
-from crossbody.reports.runs import store
 
 Said = tuple[str, Any, Any]
 SEED, WHO, LABELS = 7, ("one:p", "two:q", "three:p"), ("first:a", "second:b", "third:c")
@@ -248,10 +246,7 @@ def _moved() -> Iterator[Said]:
 def _sketch() -> Iterator[Said]:
     """Yield that a sketch is the truth's first coordinate over time, and higher where that is larger."""
     trace = drawn().traces[0]
-    with TemporaryDirectory() as folder:
-        store.save(path := Path(folder) / "truth.parquet", trace)
-        case: Any = SimpleNamespace(paths=(path,), about={"engine": "truth"})
-        points = [point.split(",") for point in index_page._sketch(case).split()]
+    points = [point.split(",") for point in index_page.sketched(trace.run).split()]
     x, y = np.array(points, dtype=np.float64).T
     t, q = trace.run.t, trace.run.q[:, 0]
     yield "samples", float(len(x)), float(len(t))
