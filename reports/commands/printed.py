@@ -135,7 +135,7 @@ def _says(words: Sequence[str], row: Row) -> bool:
     """Whether words begin with a number, and name its limit."""
     numbers = [float(word) for word in (one.strip(".,") for one in words[:1]) if _is_number(word)]
     known = math.isnan(row["value"]) or (bool(numbers) and _near(numbers[0], row["value"], DIGITS["numbers"]))
-    limits = [float(b.strip(".,")) for a, b in pairwise(words) if a == "limit"]
+    limits = [float(b.strip(".,")) for a, b in pairwise(words) if a == "limit" and _is_number(b.strip(".,"))]
     return known and (math.isnan(row["limit"]) or any(_near(one, row["limit"], DIGITS["numbers"]) for one in limits))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from crossbody.cases import installed
 from crossbody.cases.sources import readable
 from crossbody.reference import code_store
-from crossbody.reports.sources import code
+from crossbody.reports.sources import SHOWN, code
 
 Found = tuple[str, float, tuple[float, float], str]
 RIGHT = b"every known answer was right"
@@ -46,6 +46,7 @@ def kinds() -> tuple[ModuleType, ...]:
     from crossbody.reports.judging import (
         known_answers,
         known_growth,
+        known_pages,
         known_parts,
         known_sides,
         known_sources,
@@ -53,7 +54,9 @@ def kinds() -> tuple[ModuleType, ...]:
         known_tables,
     )
 
-    return known_answers, known_sides, known_growth, known_parts, known_sources, known_steps, known_tables
+    return (
+        known_answers, known_sides, known_sources, known_growth, known_parts, known_steps, known_tables, known_pages,
+    )  # fmt: skip
 
 
 def _name() -> str:
@@ -61,7 +64,7 @@ def _name() -> str:
     from crossbody.reference.cache import debugging, machine
 
     depends = (
-        code(),
+        code(SHOWN),
         *machine(),
         np.__version__,
         installed.version("scipy"),

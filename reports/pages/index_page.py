@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import installed
+from crossbody.cases import Trajectory, installed
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import look
 from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share, telling
@@ -154,7 +154,11 @@ def _sketch(case: CaseFiles) -> str:
     """The first coordinate of the truth over time, of a motion that is there."""
     if not case.paths or case.about.get("engine") != TRUTH:
         return ""
-    run = load(case.paths[0]).run
+    return sketched(load(case.paths[0]).run)
+
+
+def sketched(run: Trajectory) -> str:
+    """Return the points of a first coordinate over time, in a box of 100 by 20; nothing where it is not known."""
     if len(run.t) < 2 or not run.q.shape[1] or not np.isfinite(run.q[:, 0]).all():
         return ""
     at = keep(run.t, run.q[:, 0], np.zeros(0), SKETCHED)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +16,9 @@ from crossbody.cases import Trajectory
 from crossbody.reports.judging import (
     judge_controls,
     known,
+    known_figures,
     known_growth,
+    known_pages,
     known_parts,
     known_sides,
     known_steps,
@@ -24,10 +27,12 @@ from crossbody.reports.judging import (
     truth,
 )
 from crossbody.reports.judging.clocks import Clock, mistimed
+from crossbody.reports.judging.made_up_traces import Drawn
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring import alignment
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.metrics import event_gap
+from crossbody.reports.pages import figures, friction, grid, index_page, playback, precision, sheet, summary
 
 KNOWN = known.kinds()
 
@@ -125,6 +130,53 @@ def test_tables_whose_coefficients_are_others_are_told(monkeypatch: pytest.Monke
             changed = (*known_tables.METHODS[:k], (name, other, b, c, order), *known_tables.METHODS[k + 1 :])
             monkeypatch.setattr(known_tables, "METHODS", changed)
             assert any(abs(off) > known_tables.ROUNDED for _, off, _ in known_tables._orders())
+
+
+@pytest.fixture
+def drawn_anew() -> Iterator[None]:
+    """What pages draw is asked for, and made up, again."""
+    caches = (known_pages.wrong, known_figures.drawn)
+    for one in (*caches, *caches):
+        one.cache_clear()
+    yield
+    for one in caches:
+        one.cache_clear()
+
+
+@pytest.mark.parametrize("seed", range(20, 30))
+@pytest.mark.usefixtures("drawn_anew")
+def test_pages_draw_any_motion_as_it_is(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(known_figures, "Drawn", partial(Drawn, seed))
+    assert known_pages.wrong() == ()
+
+
+PAGES: dict[str, tuple[Any, str, Callable[[Any], Any], str]] = {
+    "a largest value": (playback, "_largest", lambda _: lambda lam: float(lam.max()), "playback"),
+    "errors with their sign": (figures, "apart", lambda _: lambda a, b, _: a - b, "motion figure"),
+    "blows left out": (figures, "with_collisions", lambda own: lambda run, _: own(run, ()), "force figure"),
+    "half an energy": (figures, "energy_of", lambda own: lambda run: 0.5 * own(run), "energy figure"),
+    "depth above": (figures, "_depth", lambda _: lambda gap, _: gap, "penetration figure"),
+    "one sample less": (sheet, "keep", lambda own: lambda *given: own(*given)[:-1], "step figure"),
+    "modes at their ends": (
+        sheet, "_spans", lambda own: lambda *given: ((b, b, mode) for _, b, mode in own(*given)), "mode figure",
+    ),
+    "slip the other way": (friction, "slip", lambda own: lambda *given: -own(*given), "friction figures"),
+    "heat by size": (grid, "share", lambda _: lambda row: abs(row["value"]) / row["limit"], "heat"),
+    "run times in s": (
+        precision, "scatter", lambda own: lambda points, *more: own([(w, x, 1e-3 * t) for w, x, t in points], *more),
+        "error against run time",
+    ),
+    "means": (summary, "median", lambda _: np.mean, "table of engines"),
+    "by its own size": (index_page, "_share", lambda _: lambda row: row["value"], "what changed"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", PAGES)
+@pytest.mark.usefixtures("drawn_anew")
+def test_what_pages_draw_otherwise_is_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    module, name, change, figure = PAGES[what]
+    monkeypatch.setattr(module, name, change(getattr(module, name)))
+    assert figure in {told for told, *_ in known_pages.wrong()}
 
 
 def test_times_that_are_no_run_s_are_told() -> None:

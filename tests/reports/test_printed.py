@@ -28,7 +28,7 @@ def row(who: str, metric: str, value: float, verdict: Word, limit: float = math.
     engine, profile = who.split(":")
     return Verdict(
         case="ball", variant=f"v{len(engine) % 2}", engine=engine, profile=profile, metric=metric, value=value,
-        unit="m", limit=limit, tier="A", verdict=verdict, why="the reason", known=known,
+        unit="m", limit=limit, tier="A", verdict=verdict, why="the limit of a law", known=known,
     ).row()  # fmt: skip
 
 
