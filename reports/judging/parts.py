@@ -109,7 +109,7 @@ def splits(case: Case, truth: Truth, run: Trajectory, study: Study, own: Truth |
         study: its other runs.
         own: the truth of the equations that the engine follows, where they are not the case's.
     """
-    positions = Positions(case, truth, run, math.inf if own is None else own.trusted)
+    positions = Positions(case, truth, truth.compared(run), math.inf if own is None else own.trusted)
     positions.expect([*study.runs, *filter(None, (study.built,))])
     laid: dict[str, Positions | Events] = {"position": positions, "event_times": Events(case, truth, run)}
     told = {metric: _split(one, metric, positions, study, own) for metric, one in laid.items() if one.whole.size}

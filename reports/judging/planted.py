@@ -211,19 +211,19 @@ def gaps(plain: Plain) -> Iterator[Control]:
     looked = spread(run)
     size = max(float(np.max(np.abs(run.gap[looked]), initial=0.0)), rounded(run.q[looked]))
     for k in plain.some(rows):
-        some = PART * max(float(np.max(np.abs(run.gap[:, rows]))), RESTS, least)
+        wide = max(float(np.max(np.abs(run.gap[:, rows]))), RESTS, least)
+        some = PART * (wide if run.gap[:, rows].any() or run.q.any() else 1.0)  # at the origin errors are absolute
         every = PART * max(float(np.max(np.abs(run.gap))), least)
-        own, wide = float(np.max(np.abs(run.gap[:, k]))), -(-len(run.t) // LOOKED)
+        own, many = float(np.max(np.abs(run.gap[:, k]))), -(-len(run.t) // LOOKED)
         most = (1.0 + SLACK) * some / own if own > 0.0 else np.inf  # its bodies may be farther than it ever opens
-        part = PART if run.gap[:, rows].any() or run.q.any() else some  # at the origin errors are absolute
         for i, sign in plain.both():
             yield Control(
                 fault=f"the gap of row {k} {sign * some:.3g} off at one sample",
-                run=plain.off("gap", (i, k), sign * some), sees={"gap_error": ((1.0 - SLACK) * part, most)},
+                run=plain.off("gap", (i, k), sign * some), sees={"gap_error": ((1.0 - SLACK) * PART, most)},
             )  # fmt: skip
             yield Control(
                 fault=f"the gap of row {k} {sign * every:.3g} off for some samples",
-                run=plain.off("gap", (slice(i, i + wide), k), sign * every),
+                run=plain.off("gap", (slice(i, i + many), k), sign * every),
                 sees={"gap_residual": exactly(every / size)},
             )  # fmt: skip
     for k in plain.some(rows)[:1]:

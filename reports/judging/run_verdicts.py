@@ -35,7 +35,7 @@ from crossbody.reports.judging.verdict import (
     judge,
     limit_for,
 )
-from crossbody.reports.measuring.truth import Truth, before, shortened
+from crossbody.reports.measuring.truth import Truth, shortened
 
 if TYPE_CHECKING:
     pass
@@ -270,7 +270,7 @@ def verdicts(
             return rows
     if not len(entry.run.t):
         return rows
-    run = before(entry.run, truth.trusted) if truth.trusted < entry.run.t[-1] else entry.run
+    run = truth.compared(entry.run)
     rows += _measured(judge_, run, truth)
     rows += _split(judge_, {row.metric: row.value for row in rows})
     return [*rows, *_vanished(judge_, {row.metric for row in rows})]

@@ -22,7 +22,7 @@ from crossbody.reports.judging.stored import changed
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
-from crossbody.reports.measuring.truth import Truth, before, sample_times, shortened
+from crossbody.reports.measuring.truth import Truth, sample_times, shortened
 
 SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
@@ -353,8 +353,7 @@ def agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
     from crossbody.reports import metrics
 
     truth = shortened(truth)
-    if len(second.t) and truth.trusted < second.t[-1]:
-        second = before(second, truth.trusted)
+    second = truth.compared(second)
     found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
     if truth.tier is Tier.C and not case.general:  # of a scene, rows that share a load may switch in any order
         found["modes"] = _other_modes(truth, second, case)

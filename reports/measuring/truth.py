@@ -73,6 +73,10 @@ class Truth:
         """Return the contacts of a run, or of this motion, as they are compared."""
         return contacts(run, self.touches, self.joined)
 
+    def compared(self, run: Trajectory) -> Trajectory:
+        """Return what of a run is compared: up to where this motion is trusted, by the run's own clock."""
+        return before(run, self.trusted) if len(run.t) and self.trusted < run.t[-1] else run
+
 
 def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 201) -> Floats:
     """Times that show a motion: a grid, more of them from each event to the next if that is short, events twice.

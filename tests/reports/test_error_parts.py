@@ -259,6 +259,24 @@ def test_a_run_whose_clock_alone_is_another_has_no_error_between_its_samples(str
     assert np.abs(whole(replace(few, t=when(few.t), v=v, events=events))[falls]).max() < 1e-9
 
 
+@pytest.mark.parametrize("late", [0.95, 1.0, 1.05])
+def test_parts_of_a_run_with_another_clock_are_those_of_what_is_compared(late: float) -> None:
+    """It is compared up to where the truth is trusted, by its own clock: parts add up to its error until then."""
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    assert ball.closed_form is not None
+    truth = replace(
+        from_run(ball.closed_form(np.linspace(0.0, 1.0, 301)), Tier.A, "exact"), at=ball.closed_form, trusted=0.7
+    )
+    exact = truth.trajectory
+    run = replace(
+        exact, t=late * exact.t, q=exact.q + 0.01 * exact.t[:, None],
+        events=tuple(replace(event, t=late * event.t) for event in exact.events),
+    )  # fmt: skip
+    whole = metrics.load("position").measure(truth, truth.compared(run), ball)
+    found = splits(ball, truth, run, Study(), own=replace(truth))["position"]
+    assert sum(found.there.values()) == pytest.approx(whole, rel=1e-9)
+
+
 def test_without_the_instant_of_one_event_there_are_no_parts_of_their_errors() -> None:
     ball = cases.load("bouncing_ball", "linear", t_end=1.0)
     assert ball.closed_form is not None
