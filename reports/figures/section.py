@@ -56,6 +56,7 @@ class Table:
         rows: plain values; numbers are shown with four digits (counts in full) and saved with all.
         file: name of a file beside the page that holds all rows, where there may be more than a page shows.
         folded: whether it is closed at first.
+        once: whether the page says text that is the same in every row once above, instead of in a column.
     """
 
     title: str
@@ -63,6 +64,7 @@ class Table:
     rows: Sequence[Mapping[str, Any]]
     file: str = ""
     folded: bool = False
+    once: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

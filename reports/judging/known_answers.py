@@ -139,7 +139,7 @@ def _gaps(made: MadeUp) -> Answers:
     return found | {
         "constraint_drift": float(np.abs(run.gap[:, on]).max()) if on.any() else None,
         "penetration": -float(deep.min()) if opens.any() else None,
-        "penetration_error": apart / -float(right.min()) if opens.any() else None,
+        "penetration_error": apart / -float(right.min()) if np.any(right < 0.0) else None,
         "final_gap": float(min(run.gap[-1, ~made.rubs])),
     }
 

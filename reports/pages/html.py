@@ -273,7 +273,7 @@ def same(table: Table) -> dict[str, str]:
         column.title: {str(row.get(column.key) or "") for row in table.rows}
         for column in table.columns if column.kind == Kind.TEXT
     }  # fmt: skip
-    several = len(table.rows) > 1
+    several = table.once and len(table.rows) > 1
     return {title: min(texts) for title, texts in found.items() if several and len(texts) == 1 and any(texts)}
 
 

@@ -39,7 +39,7 @@ def _has(out: Path, stem: str) -> bool:
 
 
 def _table(title: str, shown: Sequence[Column], rows: pd.DataFrame, stem: str, folded: bool = False) -> Table:
-    return Table(title=title, columns=shown, rows=records(rows), file=f"{stem}.csv", folded=folded)
+    return Table(title=title, columns=shown, rows=records(rows), file=f"{stem}.csv", folded=folded, once=True)
 
 
 def _one(

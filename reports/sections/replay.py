@@ -82,13 +82,15 @@ def sections(out: Path) -> tuple[Section, ...]:
     if not held:  # windows held out of a fit are judged with it, and where nothing is judged the page begins so
         said = "" if metrics["limit"].isna().all() else f"{judged(metrics)} "
         text = f"{said}{explained(metrics)} {text}"
-    table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv")
+    table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv", once=True)
     shown = [
         Section(name="replay", title="Log and model", text=text, tables=(table,)),
         Section(name="replay-plots", title="Measured and predicted", text=TEXT, plots=plots),
     ]
     if len(found):
-        table = Table(title="Findings about the log", columns=FINDINGS, rows=records(found), file="findings.csv")
+        table = Table(
+            title="Findings about the log", columns=FINDINGS, rows=records(found), file="findings.csv", once=True
+        )
         shown.append(Section(name="replay-log", title="Checks of the log", tables=(table,)))
     return tuple(shown)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -209,3 +211,14 @@ def test_a_metric_that_is_blind_is_told_of_a_linkage_with_rows_that_follow_from_
         with monkeypatch.context() as changed:
             changed.setattr(metrics, "of", lambda _, one={**every, name: none}: one)
             assert [one[0] for one in controls.unseen(case, known, lambda *_: True)] == [name]
+
+
+@pytest.mark.parametrize("label", ["dry_oscillator:swings", "sliding_block:rests"])
+def test_pages_of_one_engine_with_several_known_deviations_are_read_as_they_are(label: str, tmp_path: Path) -> None:
+    """Its name, the same in every row of a table, stood above it, and the reason was taken for the engine."""
+    out = tmp_path / "out"
+    done = subprocess.run(
+        [sys.executable, "-m", "crossbody", "run", label, "-e", "mujoco:default", "-q", "--out", str(out)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr

@@ -714,7 +714,7 @@ def test_a_cell_without_a_number_says_why(verdict: Word, metric: str, why: str, 
 def test_what_is_the_same_in_every_row_is_said_once_above_the_table() -> None:
     shown = Table(
         title="T", columns=columns(case="Case", who="Engine", x=("X", Kind.NUMBER), empty="Empty"),
-        rows=[{"case": "ball:hard", "who": who, "x": 1.0, "empty": ""} for who in ("a:p", "b:p")],
+        rows=[{"case": "ball:hard", "who": who, "x": 1.0, "empty": ""} for who in ("a:p", "b:p")], once=True,
     )  # fmt: skip
     assert html.same(shown) == {"Case": "ball:hard"}
     assert [column.title for column in html.told(shown)] == ["Engine", "X"]
