@@ -7,6 +7,7 @@ that runs and judges are made of, plug-ins, versions of libraries, and the proce
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib import import_module
 from types import ModuleType
 
 import numpy as np
@@ -17,6 +18,10 @@ from crossbody.reference import code_store
 from crossbody.reports.sources import SHOWN, code
 
 Found = tuple[str, float, tuple[float, float], str]
+KINDS = (
+    "judging.known_answers", "judging.known_sides", "judging.known_sources", "judging.known_growth",
+    "judging.known_parts", "judging.known_steps", "judging.known_tables", "pages.known_pages",
+)  # fmt: skip
 RIGHT = b"every known answer was right"
 
 once = False
@@ -42,21 +47,8 @@ def _asked() -> Iterator[Found]:
 
 
 def kinds() -> tuple[ModuleType, ...]:
-    """Return the modules that ask, each by its `wrong`."""
-    from crossbody.reports.judging import (
-        known_answers,
-        known_growth,
-        known_pages,
-        known_parts,
-        known_sides,
-        known_sources,
-        known_steps,
-        known_tables,
-    )
-
-    return (
-        known_answers, known_sides, known_sources, known_growth, known_parts, known_steps, known_tables, known_pages,
-    )  # fmt: skip
+    """Return the modules that ask, each by its `wrong`: found by name, since pages import what is judged."""
+    return tuple(import_module(f"crossbody.reports.{name}") for name in KINDS)
 
 
 def _name() -> str:

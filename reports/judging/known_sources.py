@@ -12,7 +12,7 @@ from crossbody.cases import Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.judging.made_up import case_of
 from crossbody.reports.judging.planted import Range
-from crossbody.reports.judging.truth import PARTED, _held_against, agreement
+from crossbody.reports.judging.truth import PARTED, agreement, held_against
 from crossbody.reports.measuring.truth import from_run
 
 SAMPLES, TOUCH, RELEASE = 400, 0.31, 0.67
@@ -42,11 +42,11 @@ def wrong() -> tuple[Found, ...]:
                 yield metric, found.get(metric, np.nan), wanted.get(metric, 0.0), CLOSE, f"two sources apart by {name}"
         for rate in np.divide(RATES, end):
             off = ROUNDED * np.exp(rate * exact.t)
-            held = _held_against(truth, replace(exact, q=exact.q + off[:, None]), case, TOLERANCE)
+            held = held_against(truth, replace(exact, q=exact.q + off[:, None]), case, TOLERANCE)
             told = f"two sources that part by {rate:.3g} /s"
             yield "trusted", held.trusted, float(exact.t[np.argmax(off / size > PARTED)]), CLOSE, told
             yield "growth", held.growth, float(rate), 10.0 * CLOSE, told
-        yield "trusted", _held_against(truth, exact, case, TOLERANCE).trusted, np.inf, CLOSE, "two sources that agree"
+        yield "trusted", held_against(truth, exact, case, TOLERANCE).trusted, np.inf, CLOSE, "two sources that agree"
 
     return tuple(
         (metric, found, ((1.0 - part) * wanted, (1.0 + part) * wanted), said)

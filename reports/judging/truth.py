@@ -84,7 +84,7 @@ def truth_of(case: Case, known: Followed | None = None, budget: float = BUDGET) 
     if "reference" not in engines.names() or not has_equations(case):
         return truth
     second = tight(case)
-    told = _held_against(truth, second, case, case.tight)
+    told = held_against(truth, second, case, case.tight)
     # A closed form is not cut short by what is held against it.
     return replace(told, trusted=math.inf, parted=math.inf, agreement=agreement(truth, second, case))
 
@@ -141,10 +141,10 @@ def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget
         tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
         grows=float(grown[-1]), touches=case.law.touches, joined=case.general,
     )  # fmt: skip
-    truth = _held_against(truth, second, case, loose)
+    truth = held_against(truth, second, case, loose)
     if (horizon := _horizon(case, truth, second, t, grown)) is not None:
         known = replace(truth, horizon=horizon, grows=float(np.interp(horizon.until, t, grown)))
-        truth = _held_against(known, second, replace(case, chaos=horizon), loose)
+        truth = held_against(known, second, replace(case, chaos=horizon), loose)
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
     source = f"compiled reference at rtol {case.tight:g}, {who} at {loose:g} agrees: {said}; they share {shared}{why}"
     if truth.parted < case.t_end:
@@ -282,7 +282,7 @@ def grown(t: Floats, apart: Floats, off: float) -> Floats:
     return largest
 
 
-def _held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
+def held_against(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
     """The truth with what a second source says of it: agreement, until when, how fast they part."""
     t, off = _apart(truth, second, case)
     parted = off > PARTED

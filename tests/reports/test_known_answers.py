@@ -16,9 +16,7 @@ from crossbody.cases import Trajectory
 from crossbody.reports.judging import (
     judge_controls,
     known,
-    known_figures,
     known_growth,
-    known_pages,
     known_parts,
     known_sides,
     known_steps,
@@ -27,12 +25,23 @@ from crossbody.reports.judging import (
     truth,
 )
 from crossbody.reports.judging.clocks import Clock, mistimed
-from crossbody.reports.judging.made_up_traces import Drawn
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring import alignment
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.metrics import event_gap
-from crossbody.reports.pages import figures, friction, grid, index_page, playback, precision, sheet, summary
+from crossbody.reports.pages import (
+    figures,
+    friction,
+    grid,
+    index_page,
+    known_figures,
+    known_pages,
+    playback,
+    precision,
+    sheet,
+    summary,
+)
+from crossbody.reports.pages.made_up_traces import Drawn
 
 KNOWN = known.kinds()
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reports.judging import known_figures, known_playback, known_texts
 from crossbody.reports.judging.planted import Range
+from crossbody.reports.pages import known_figures, known_playback, known_texts
 
 SHOWN, ROUNDED = 2e-4, 1e-6
 """Part of a number that a logarithmic axis does not show, and of the largest that single precision does not."""

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from crossbody.reports.figures.styles import COLOURS
-from crossbody.reports.judging.known_figures import drawn
-from crossbody.reports.judging.made_up_traces import axis
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid, index_page, precision, summary
+from crossbody.reports.pages.known_figures import drawn
+from crossbody.reports.pages.made_up_traces import axis
 
 Said = tuple[str, Any, Any]
 SEED, WHO, LABELS = 7, ("one:p", "two:q", "three:p"), ("first:a", "second:b", "third:c")

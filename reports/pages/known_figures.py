@@ -13,7 +13,8 @@ import numpy as np
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.styles import COLOURS
-from crossbody.reports.judging.made_up_traces import (
+from crossbody.reports.pages import figures, sheet
+from crossbody.reports.pages.made_up_traces import (
     CONTACTS,
     MANY,
     NAMES,
@@ -29,7 +30,6 @@ from crossbody.reports.judging.made_up_traces import (
     levels,
     lines,
 )
-from crossbody.reports.pages import figures, sheet
 from crossbody.reports.runs.store import Trace
 
 Said = tuple[str, Any, Any]

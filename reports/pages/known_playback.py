@@ -14,8 +14,9 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_plain import plain
 from crossbody.reports.figures.styles import COLOURS
-from crossbody.reports.judging.known_figures import drawn
-from crossbody.reports.judging.made_up_traces import (
+from crossbody.reports.pages import friction, playback
+from crossbody.reports.pages.known_figures import drawn
+from crossbody.reports.pages.made_up_traces import (
     CONTACTS,
     OFF,
     ON,
@@ -26,7 +27,6 @@ from crossbody.reports.judging.made_up_traces import (
     lines,
     numbers,
 )
-from crossbody.reports.pages import friction, playback
 from crossbody.reports.scenes import Stage
 
 Said = tuple[str, Any, Any]
