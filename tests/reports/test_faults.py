@@ -18,7 +18,7 @@ from crossbody.reports.judging import stored
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.parts import PARTS
 from crossbody.reports.judging.run_verdicts import Entry
-from crossbody.reports.judging.truth import _held_against, truth_of
+from crossbody.reports.judging.truth import held_against, truth_of
 from crossbody.reports.judging.verdict import Regression, Word, exit_code
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import choice, jobs
@@ -170,7 +170,7 @@ def test_a_truth_that_drifts_is_outside(recorded: Recorded) -> None:
         exact = truth.at(times)
         return replace(exact, q=exact.q * (1.0 + 0.01 * times)[:, None])
 
-    wrong = _held_against(replace(truth, at=at), second, case, 1e-12)
+    wrong = held_against(replace(truth, at=at), second, case, 1e-12)
     assert "truth" in _outside(case, entries["pinocchio:law"], wrong)
 
 
@@ -195,7 +195,7 @@ def test_truths_part_at_the_same_instant_in_any_unit_of_length(size: float, reco
             return replace(truth.at(times), q=by * truth.at(times).q)
 
         scaled = replace(truth, trajectory=replace(truth.trajectory, q=by * truth.trajectory.q), at=at)
-        return _held_against(scaled, replace(second, q=by * second.q), case, 1e-12)
+        return held_against(scaled, replace(second, q=by * second.q), case, 1e-12)
 
     one, other = told(1.0), told(size)
     assert 0.0 < one.trusted < case.t_end

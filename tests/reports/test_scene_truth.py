@@ -153,12 +153,12 @@ def test_sources_that_part_where_neighbouring_motions_do_not_are_no_truth(monkey
     """A fault in one of them grows as no motion does."""
     from crossbody.reports.judging import truth as module
 
-    right = module._held_against
+    right = module.held_against
 
     def wrong(truth: Truth, second: Trajectory, case: Case, rtol: float) -> Truth:
         return right(truth, replace(second, q=second.q * (1.0 + 1e-2 * second.t[:, None])), case, rtol)
 
-    monkeypatch.setattr(module, "_held_against", wrong)
+    monkeypatch.setattr(module, "held_against", wrong)
     for case in (double_pendulum(0.5, 2.0), double_pendulum(2.5, 30.0)):
         found = truth_of(case)
         assert found.horizon is None

@@ -26,7 +26,7 @@ from crossbody.reports.judging.comparison import compare, judged
 from crossbody.reports.judging.parts import Split
 from crossbody.reports.judging.run_verdicts import Entry, Judge
 from crossbody.reports.judging.stored import deviations
-from crossbody.reports.judging.truth import _held_against, truth_of
+from crossbody.reports.judging.truth import held_against, truth_of
 from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.judging.verdict import (
     FACTOR,
@@ -472,7 +472,7 @@ def test_two_truths_must_agree_to_a_multiple_of_the_tolerance(
 ) -> None:
     truth = truth_of(case)
     second = replace(motion, q=motion.q * (1.0 + off * motion.t / case.t_end)[:, None])
-    found = _held_against(replace(truth, trusted=math.inf), second, case, 1e-13)
+    found = held_against(replace(truth, trusted=math.inf), second, case, 1e-13)
     assert (found.trusted < case.t_end) == parts
     (row,) = truth_row(case, found, "")
     assert row.verdict == word
@@ -487,7 +487,7 @@ def test_a_source_that_ended_early_agrees_as_far_as_it_went(share: float, case: 
         events=tuple(event for event in motion.events if event.t <= share * case.t_end),
     )  # fmt: skip
     assert ledger is None or len(ledger.input) == len(motion.t)
-    found = _held_against(replace(truth_of(case), trusted=math.inf), short, case, 1e-9)
+    found = held_against(replace(truth_of(case), trusted=math.inf), short, case, 1e-9)
     assert found.trusted <= share * case.t_end
     (row,) = truth_row(case, found, "")
     assert row.verdict == Word.OUTSIDE
