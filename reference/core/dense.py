@@ -43,11 +43,8 @@ def _powers_inside(K: Any, s: Any, m: Model, w: Work) -> int:
     for j in range(3):
         theta = 0.25 * (j + 1)
         t = s.t_old + theta * s.hs
-        state(s, m, w, theta, w.ys)
-        if s.na > 0 and not put_on_rows(K, s, m, w, theta, w.ys, tolerated(s)):
-            q, v = w.ys[: s.nq], w.ys[s.nq :]
-            if accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, q, v, OWN) != 0:
-                return 1
+        if with_rows(K, s, m, w, theta, t, w.ys) != 0:
+            return 1
         powers(K, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], INSIDE + j)
     return 0
 
@@ -183,6 +180,15 @@ def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array, lef
         solve_schur(w.G, s.na, w.reach, w.rate, w.la)
         push_rows(m, w, s.na, w.la, 1.0, v)
     return False
+
+
+@compiled
+def with_rows(K: Any, s: Any, m: Model, w: Work, theta: float, t: float, out: Array) -> int:
+    """Out = (q, v) at the part theta of the step, the time t, and leave the multipliers there; 1 if ill posed."""
+    state(s, m, w, theta, out)
+    if s.na > 0 and not put_on_rows(K, s, m, w, theta, out, tolerated(s)):
+        return int(accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, out[: s.nq], out[s.nq :], OWN))
+    return 0
 
 
 @compiled

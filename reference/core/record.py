@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import dense, peaks
-from crossbody.reference.core.acceleration import OWN, accelerate, scatter
+from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import copy
 from crossbody.reference.core.layout import EXACT, NEVER, Model, Work
 from crossbody.reference.kinds import Array, Bytes, Floats
@@ -73,9 +73,7 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     """Append the state at a time inside the step."""
     theta = min(max((t - s.t_old) / s.hs, 0.0), 1.0)
     dense.prepare(K, s, m, w)
-    dense.state(s, m, w, theta, w.ys)
-    if s.na > 0 and not dense.put_on_rows(K, s, m, w, theta, w.ys, dense.tolerated(s)):
-        accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], OWN)
+    dense.with_rows(K, s, m, w, theta, t, w.ys)
     scatter(s, w, w.lam)
     z = w.z
     if s.ledger and s.method != EXACT:

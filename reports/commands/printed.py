@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
@@ -68,9 +68,9 @@ def check_times(text: str, times: Times) -> None:
     """
     said = {name: float(number) for name, number in _SPENT.findall(" ".join(click.unstyle(text).split()))}
     within = {name: seconds for name, seconds in said.items() if name not in ("Time:", *STAGES)}
-    whole: Counter[str] = Counter()
+    whole: defaultdict[str, float] = defaultdict(float)
     for (_, who), (_, seconds) in times.items():
-        whole[who.partition(":")[0]] += seconds or 0.0  # type: ignore[assignment]  # it counts any number
+        whole[who.partition(":")[0]] += seconds or 0.0
     sums = [said["Time:"] - sum(said[name] for name in STAGES)]
     sums += [said["runs"] - sum(within.values())] if within else []
     off = [abs(one) / (1 + len(STAGES) + len(whole)) for one in sums]  # what is less than half of a tenth is not said

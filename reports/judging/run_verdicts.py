@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, Claim, CrossbodyError, Limit, Trajectory, Value
@@ -36,9 +36,6 @@ from crossbody.reports.judging.verdict import (
     limit_for,
 )
 from crossbody.reports.measuring.truth import Truth, shortened
-
-if TYPE_CHECKING:
-    pass
 
 GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",

@@ -125,6 +125,6 @@ def taken(run: Trajectory, some: NDArray[np.intp] | NDArray[np.bool_] | slice) -
     return replace(run, **{name: getattr(run, name)[some] for name in names}, ledger=booked)
 
 
-def from_run(run: Trajectory, tier: Tier, source: str) -> Truth:
+def from_run(run: Trajectory, tier: Tier, source: str, touches: NDArray[np.bool_] | None = None) -> Truth:
     """A run as the truth for others: an engine refined against itself, or a measurement."""
-    return Truth(tier=tier, source=source, trajectory=run, at=between(run), agreement={})
+    return Truth(tier=tier, source=source, trajectory=run, at=between(run), agreement={}, touches=touches)

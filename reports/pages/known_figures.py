@@ -25,6 +25,7 @@ from crossbody.reports.pages.made_up_traces import (
     UNITS,
     WHO,
     Drawn,
+    Said,
     axis,
     bands,
     levels,
@@ -32,7 +33,6 @@ from crossbody.reports.pages.made_up_traces import (
 )
 from crossbody.reports.runs.store import Trace
 
-Said = tuple[str, Any, Any]
 LIMITS = {
     "position": {0.31: "limit", 0.53: "limit of two:q"}, "lam_impulse_path": {0.17: "limit"}, "lam_error": {0.13: "b"},
     "energy_integrator": {0.19: "limit"}, "energy_drift": {0.29: "drift"}, "penetration": {0.31: "limit"},

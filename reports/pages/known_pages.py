@@ -14,12 +14,11 @@ import numpy as np
 
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.pages import known_figures, known_playback, known_texts
+from crossbody.reports.pages.made_up_traces import Said
 
 SHOWN, ROUNDED = 2e-4, 1e-6
 """Part of a number that a logarithmic axis does not show, and of the largest that single precision does not."""
 Found = tuple[str, float, Range, str]
-Said = tuple[str, Any, Any]
-"""Which number, as it is drawn, and as it must be: numbers, arrays of numbers, or words."""
 
 
 @cache

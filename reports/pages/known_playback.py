@@ -23,13 +23,13 @@ from crossbody.reports.pages.made_up_traces import (
     PLACES,
     TURNING,
     WHO,
+    Said,
     axis,
     lines,
     numbers,
 )
 from crossbody.reports.scenes import Stage
 
-Said = tuple[str, Any, Any]
 MU, WEIGHTS = 0.37, (1.0, 2.0)
 """Of friction; and the two components of an arrow for a multiplier of 1."""
 

@@ -14,9 +14,8 @@ from crossbody.reports.figures.styles import COLOURS
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid, index_page, precision, summary
 from crossbody.reports.pages.known_figures import drawn
-from crossbody.reports.pages.made_up_traces import axis
+from crossbody.reports.pages.made_up_traces import Said, axis
 
-Said = tuple[str, Any, Any]
 SEED, WHO, LABELS = 7, ("one:p", "two:q", "three:p"), ("first:a", "second:b", "third:c")
 PLACES = {"one:p": 2, "two:q": 6, "three:p": 4, "reference:compiled": 1}
 OFF = (3.7, -250.0, 9e4)

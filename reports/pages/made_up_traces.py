@@ -15,6 +15,8 @@ from crossbody.cases import Event, Ledger, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.runs.store import Trace
 
+Said = tuple[str, Any, Any]
+"""Which number, as it is drawn, and as it must be: numbers, arrays of numbers, or words."""
 SEED, SAMPLES, MANY = 11, 40, 5000
 NAMES, UNITS, CONTACTS = ("x", "y", "z"), ("m", "cm", "rad"), ("a", "b", "on", "off")
 """Coordinates, each of a unit of its own; contacts: two that open, one that never does, one that carries nothing."""

@@ -103,7 +103,7 @@ def _exact(case: Case, times: Floats) -> Truth | str:
     motion = case.closed_form(times)
     if not motion.outcome.ok:
         return f"no truth: {motion.message}"
-    return replace(from_run(motion, Tier.A, "closed form"), at=case.closed_form, touches=case.law.touches)
+    return replace(from_run(motion, Tier.A, "closed form", case.law.touches), at=case.closed_form)
 
 
 def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Truth | str:
@@ -117,7 +117,7 @@ def _second(case: Case, times: Floats, max_steps: int, time_limit: float) -> Tru
     ).run()
     if not other.outcome.ok:
         return f"no truth: the independent integrator ended with {other.outcome.value}"
-    return replace(from_run(other, Tier.C, "compiled against CVODE"), touches=case.law.touches)
+    return from_run(other, Tier.C, "compiled against CVODE", case.law.touches)
 
 
 def _divergence(truth: Truth, times: Floats, asked: Asked, most: float, t_end: float) -> float:
