@@ -56,11 +56,46 @@ def ways(q: Floats, quaternions: Sequence[int]) -> Floats:
 
 def differences(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
     """Return |q - other| (n, nq); in the first entry of a quaternion the angle, rad, and 0 in the others."""
-    found: Floats = np.abs(q - other)
-    for at in quaternions:
-        entries = slice(at, at + 4)
-        found[:, at] = np.linalg.norm(turned(q[:, entries], other[:, entries]), axis=1)
-        found[:, at + 1 : at + 4] = 0.0
+    return sizes(signed(q, other, quaternions), quaternions)
+
+
+def signed(q: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return how positions are off others (n, nv), as velocities count: of a quaternion the rotation vector, rad."""
+    parts, at = [], 0
+    for first in quaternions:
+        turn = slice(first, first + 4)
+        parts += [q[:, at:first] - other[:, at:first], turned(q[:, turn], other[:, turn])]
+        at = first + 4
+    return np.concatenate([*parts, q[:, at:] - other[:, at:]], axis=1)
+
+
+def drifts(off: Floats, v: Floats, other: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return the rates (n, nv) of what `signed` gives, from velocities v and those of the others (n, nv).
+
+    Of a rotation vector they follow from both angular velocities in body axes (Bullo and Murray 1995, "Proportional
+    derivative (PD) control on the Euclidean group").
+    """
+    found: Floats = v - other
+    for i, first in enumerate(quaternions):
+        turn = slice(first - i, first - i + 3)
+        e, apart = off[:, turn], v[:, turn] - other[:, turn]
+        half = 0.5 * np.linalg.norm(e, axis=1, keepdims=True)
+        small = half < 1e-3
+        safe = np.where(small, 1.0, half)
+        bent = np.where(small, 1.0 / 12.0, 0.25 * (1.0 - safe / np.tan(safe)) / (safe * safe))
+        found[:, turn] += 0.5 * np.cross(e, v[:, turn] + other[:, turn]) + bent * np.cross(e, np.cross(e, apart))
+    return found
+
+
+def sizes(off: Floats, quaternions: Sequence[int]) -> Floats:
+    """Return the sizes (n, nq) of what `signed` gives (n, nv); in the first entry of a quaternion, 0 in the others."""
+    parts, at = [], 0
+    for i, first in enumerate(quaternions):
+        turn = off[:, first - i : first - i + 3]
+        angle = np.linalg.norm(turn, axis=1, keepdims=True)
+        parts += [np.abs(off[:, at : first - i]), angle, np.zeros_like(turn)]
+        at = first - i + 3
+    found: Floats = np.concatenate([*parts, np.abs(off[:, at:])], axis=1)
     return found
 
 

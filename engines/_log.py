@@ -26,6 +26,7 @@ class Log:
         mode: modes of the rows.
         events: transitions, in order.
         switches: changes of discrete variables, in order.
+        aside_s: wall time in which nothing was integrated, s, but told of what is inside of steps.
         follows: index of the row whose mode each one shares, which has no events of its own; -1 for none.
     """
 
@@ -35,6 +36,7 @@ class Log:
         self.mode: list[Modes] = []
         self.events: list[Event] = []
         self.switches: list[Switch] = []
+        self.aside_s = 0.0
         self.follows: Sequence[int] = ()
 
     def add(self, t: float, q: Floats, v: Floats, lam: Any, mode: Modes) -> None:

@@ -76,7 +76,7 @@ class PinocchioRun(Run):
         log = Log()
         start = perf_counter()
         solver, counts = self.integrate(log)
-        wall = perf_counter() - start
+        wall = perf_counter() - start - log.aside_s
         chart = self.scene.chart
         found = log.trajectory(self.scene.observe, solver.outcome, solver.message, solver.steps, wall, counts, chart)
         acting = self.scene.world.acting
@@ -236,6 +236,7 @@ def _flowing(machine: Callable[[], Machine], case: Case, scene: Prepared, used: 
             tried = {one: (own := Log(), flown(own, one, min(limit, TRIED))) for one in METHODS}
             paces = {one: own.motion[-1][0] / max(flow.rhs, 1) for one, (own, flow) in tried.items()}
             counts = {"tried": sum(flow.rhs for _, flow in tried.values())}
+            log.aside_s = sum(own.aside_s for own, _ in tried.values())
         flow = flown(log, max(paces, key=paces.__getitem__), limit)
         return flow, {"rhs": flow.rhs, **counts}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,8 @@ LOOKS = np.linspace(0.0, 1.0, 10)[1:-1].tolist()
 """Parts of a step at which rows are looked at that may have turned twice in it."""
 ROUNDED = 8.0 * ULP
 """Part of the largest coordinate that rounding may make of a gap: what hangs side by side parts by it."""
+SHOWN = 200
+"""Parts of the horizon, none of which is left without a sample: what falls or rests takes steps of any length."""
 SAME_INSTANT = 100  # events in a row without the time moving on that make a cycle
 
 
@@ -56,6 +59,7 @@ class Flow:
         self.q, self.v = np.empty(self.n), np.empty(len(atol) - self.n)  # Pinocchio and CVODE do not share memory
         self.vd: Floats = np.zeros(self.n)
         self.steps = self.rhs = self.still = 0
+        self.longest = math.inf
         self.outcome, self.message = Outcome.FINISHED, ""
         self.modes = first_modes(self.rows)
         options: dict[str, Any] = {"rtol": rtol, "atol": atol, "method": method, "max_num_steps": PER_SOLVE}
@@ -74,7 +78,7 @@ class Flow:
 
     def run(self, q0: Floats, v0: Floats, t_end: float) -> None:
         """Integrate from (q0, v0) to t_end, s."""
-        self.start = q0.copy()
+        self.start, self.longest = q0.copy(), t_end / SHOWN
         self.world.reset()
         if self.ways is not None:
             self.ways.begin(q0)
@@ -129,16 +133,34 @@ class Flow:
                 self.solver.init_step(t, y)
                 continue
             before, t, stop, asked = t, float(step.t), end, t
-            modes, y = self.modes, self._switch(t, np.array(step.y), fired, turned=turned)
+            reached = np.array(step.y)
+            if t - before > self.longest:
+                self._tell_inside(before, t)
+            modes, y = self.modes, self._switch(t, reached, fired, turned=turned)
             self.still = self.still + 1 if t == before else 0
             if self.still > SAME_INSTANT:
                 bad = Outcome.MODE_CYCLE if fired or turned else Outcome.STEP_TOO_SMALL
                 gone = "" if fired or turned else self._vanished(y)
                 bad = Outcome.ILL_POSED if gone else bad
                 return self._end(bad, t, y, gone or f"time does not advance (rows {modes})")
-            if turned or self.modes != modes or not np.array_equal(y, step.y):
+            if turned or self.modes != modes or not np.array_equal(y, reached):
                 self.solver.init_step(t, y)
         return y
+
+    def _tell_inside(self, before: float, t: float) -> None:
+        """Record what CVODE's own polynomial says inside of a long step, s; CVODE then stands at its end again."""
+        began = perf_counter()
+        for at in np.linspace(before, t, math.ceil((t - before) / self.longest) + 1)[1:-1].tolist():
+            q, v = self._state(self._inside(at))
+            self._tell(at)
+            self._record(at, q, v, self.rows.accelerate(q, v, self.modes)[1])
+        self._inside(t)
+        self.log.aside_s += perf_counter() - began
+
+    def _inside(self, t: float) -> Floats:
+        """Return the state at an instant, s, of the last step; behind a zero the first answer is the zero again."""
+        asked = self.solver.step(t, method="normal")
+        return np.array(asked.y if asked.t == t else self.solver.step(t, method="normal").y)
 
     def _vanished(self, y: Floats) -> str:
         """What to say where hardly anything moves a row that must move, and something did at the start."""

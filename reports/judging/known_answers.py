@@ -86,7 +86,7 @@ def _coordinates(made: MadeUp) -> Answers:
     fast = largest_of_like(np.abs(exact.v).max(axis=0), [c.unit for c in case.velocities])
     found: dict[str, float | None] = {"velocity": float((np.abs(run.v[:k] - exact.v[:k]) / fast).max())}
     if case.scene is None and not case.quaternions:
-        found["position"] = float((np.abs(run.q[:k] - exact.q[:k]) / own).max())
+        found["position"] = float((_at_and_between(run, exact, k, case.t_end / 200.0) / own).max())
     if not case.quaternions:
         step, mean = np.diff(run.t)[:, None], 0.5 * (run.v[1:] + run.v[:-1])
         moved = np.diff(run.q, axis=0)
@@ -103,6 +103,22 @@ def _coordinates(made: MadeUp) -> Answers:
     angles = all(c.unit == "rad" for c in case.coordinates)
     found["angle_error"] = float(np.abs(run.q[:k] - exact.q[:k]).max()) if angles else None
     return found
+
+
+def _at_and_between(run: Trajectory, exact: Trajectory, k: int, far: float) -> Floats:
+    """Errors of the first k samples (m, nq), and at eight instants of what is longer than `far`, s, by de Casteljau."""
+    off = run.q[:k] - exact.q[:k]
+    found = [*off]
+    for i, (own, step) in enumerate(zip(np.diff(run.t[:k]), np.diff(exact.t[:k]), strict=True)):
+        way = [(run.v[j] * own - exact.v[j] * step) / 3.0 for j in (i, i + 1)]
+        ends = off[i], off[i] + way[0], off[i + 1] - way[1], off[i + 1]
+        for x in [part / 9.0 for part in range(1, 9)] if own > far else ():
+            points = list(ends)
+            while len(points) > 1:
+                points = [(1.0 - x) * a + x * b for a, b in pairwise(points)]
+            found += points
+    sizes: Floats = np.abs(np.array(found))
+    return sizes
 
 
 def _energies(made: MadeUp) -> Answers:

@@ -31,7 +31,8 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.rotations import turned
 from crossbody.reports.measuring.alignment import clock, matched
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.apart import LOOKS, far_apart, rate_of_error
+from crossbody.reports.measuring.truth import Truth, taken
 from crossbody.reports.metrics.position import scale_of
 
 PARTS = ("importer", "model", "step")
@@ -258,8 +259,15 @@ class Positions:
         kept = distinct(np.linspace(0, max(len(inside) - 1, 0), min(len(inside), SAMPLES)).astype(np.intp))
         if error.size:  # the worst sample is one of them
             kept = distinct(kept, [np.unravel_index(int(np.argmax(self.sizes(error))), error.shape)[0]])
-        self.samples, self.whole, self.end = inside[kept], error[kept], end
-        self.t = t[self.samples]
+        self.samples, self.end = inside[kept], end
+        self.long = far_apart(run.t[inside], case)
+        between = self._between(t)
+        self.t = np.concatenate([t[self.samples], between])
+        self.whole = np.concatenate([error[kept], self._lay(run, truth, between)]) if len(between) else error[kept]
+
+    def _between(self, t: Floats) -> Floats:
+        """Return the instants (m,) inside of long steps of the judged run, by a clock (n,) that its samples have."""
+        return np.concatenate([np.zeros(0), *(t[i] + LOOKS * (t[i + 1] - t[i]) for i in self.long)])
 
     def __call__(self, run: Trajectory) -> Floats:
         """Return the error of a run at the same instants of the truth's clock; each is laid there once.
@@ -268,54 +276,60 @@ class Positions:
             NotMeasuredError: if it ends before.
         """
         if id(run) not in self.laid:
-            self.laid[id(run)] = self._lay(run)
+            self.laid[id(run)] = self._lay(run, self.truth, self.t)
         return self.laid[id(run)]
 
     def expect(self, runs: Sequence[Trajectory]) -> None:
         """Have the truth found at once for all runs that will be laid on it."""
         if self.whole.size:
             clocks = (clock(self.truth, run) for run in runs if len(run.t))
-            self.truth.expect(self._asked(t, distinct(self._around(t))) for t in clocks)
+            self.truth.expect(self._asked(t, distinct(self._around(t, self.t)), self.truth) for t in clocks)
 
-    def _around(self, t: Floats) -> NDArray[np.intp]:
-        """Return the samples at t (n,) before and behind those of the judged run (2, m)."""
-        behind = np.clip(np.searchsorted(t, self.t), 0, len(t) - 1)
+    def _around(self, t: Floats, instants: Floats) -> NDArray[np.intp]:
+        """Return the samples at t (n,) before and behind instants (m,): (2, m)."""
+        behind = np.clip(np.searchsorted(t, instants), 0, len(t) - 1)
         return np.stack([np.maximum(behind - 1, 0), behind])
 
-    def _asked(self, t: Floats, samples: NDArray[np.intp]) -> Floats:
-        """Return when the truth is asked for at samples: it ends where it ends."""
-        return np.minimum(t[samples], float(self.truth.trajectory.t[-1]))
+    def _asked(self, t: Floats, samples: NDArray[np.intp], truth: Truth) -> Floats:
+        """Return when a truth is asked for at samples: it ends where it ends."""
+        return np.minimum(t[samples], float(truth.trajectory.t[-1]))
 
-    def _lay(self, run: Trajectory) -> Floats:
-        """Return the error of a run.
+    def _lay(self, run: Trajectory, truth: Truth, instants: Floats) -> Floats:
+        """Return the error of a run at instants (m,) of the truth's clock.
 
         Between its samples the error is interpolated, which is smaller and smoother than the motion: by a
-        cubic through the rates of both, where positions have rates of their own, else by a straight line.
+        cubic through the rates of both.
         """
-        t = clock(self.truth, run)
-        if not len(t) or t[-1] < self.t[-1] - REACHED * self.case.t_end:
+        t = clock(truth, run)
+        if not len(t) or t[-1] < instants.max() - REACHED * self.case.t_end:
             raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
-        before, behind = around = self._around(t)
+        before, behind = around = self._around(t, instants)
         needed = distinct(around)
-        exact = self.truth.at(self._asked(t, needed))
+        exact = truth.at(self._asked(t, needed, truth))
         error = self._error(run.q[needed], exact.q)
         a, b = (np.searchsorted(needed, side) for side in (before, behind))
         width = (t[behind] - t[before])[:, None]
         wide = np.where(width > 0.0, width, 1.0)
-        x = np.clip(np.where(width > 0.0, (self.t - t[before])[:, None] / wide, 1.0), 0.0, 1.0)
-        found: Floats = error[a] + x * (error[b] - error[a])
-        if self.case.quaternions:
-            return found
+        x = np.clip(np.where(width > 0.0, (instants - t[before])[:, None] / wide, 1.0), 0.0, 1.0)
         own = (run.t[behind] - run.t[before])[:, None] / wide  # the run's clock over the truth's
-        left, right = ((run.v[needed[i]] * own - exact.v[i]) * width / self.scale for i in (a, b))
+        sides = ((taken(run, needed[i]), taken(exact, i)) for i in (a, b))
+        left, right = (self._filled(rate_of_error(truth, *side, own, self.case)) for side in sides)
         slope = error[b] - error[a]
-        found += x * (1.0 - x) * ((1.0 - x) * (left - slope) + x * (slope - right))
+        found: Floats = error[a] + x * slope
+        found += x * (1.0 - x) * ((1.0 - x) * (width * left - slope) + x * (slope - width * right))
         return found
 
     def against(self, own: Truth) -> Floats:
         """Return the error of the judged run against another truth, on its clock."""
-        t = np.minimum(clock(own, self.run)[self.samples], float(own.trajectory.t[-1]))
-        return self._error(self.run.q[self.samples], own.at(t).q)
+        t = clock(own, self.run)
+        exact = own.at(np.minimum(t[self.samples], float(own.trajectory.t[-1])))
+        error, between = self._error(self.run.q[self.samples], exact.q), self._between(t)
+        return np.concatenate([error, self._lay(self.run, own, between)]) if len(between) else error
+
+    def _filled(self, rates: Floats) -> Floats:
+        """Return rates (n, nv) as errors count: relative, with a zero behind those of each rotation (n, components)."""
+        filled = [at - i + 3 for i, at in enumerate(self.case.quaternions)]
+        return np.insert(rates, filled, 0.0, axis=1) / self.scale
 
     def _error(self, q: Floats, exact: Floats) -> Floats:
         error = q - exact

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.rotations import differences
 from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.apart import errors
 from crossbody.reports.measuring.scale import RESTS, ROUNDING, least, of_like
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth, taken
 
 UNIT = "1"
 CLAIMED = False
@@ -23,9 +23,10 @@ SMALL, STILL = 1e-6, 1e-9  # a coordinate that moves less than this part of its 
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Max over samples and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests.
+    """Max over samples, between them, and coordinates of |q - q_truth| / max |q_truth|, of its like where one rests.
 
-    A quaternion is compared by the angle between both, rad, since q and -q are the same rotation.
+    A quaternion is compared by the angle between both, rad, since q and -q are the same rotation. Between samples that
+    are further apart than a 200th of the horizon the error is the cubic through both of theirs and of the velocities'.
     """
     off, _ = _errors(truth, run, case)
     return float(np.max(off / scale_of(truth.trajectory, case))) if len(off) else None
@@ -42,9 +43,8 @@ def where(truth: Truth, run: Trajectory, case: Case) -> str:
 
 
 def _errors(truth: Truth, run: Trajectory, case: Case) -> tuple[Floats, Floats]:
-    """Return how far samples are off (n, nq), and their instants (n,), s."""
     inside, exact = aligned(truth, run)
-    return differences(run.q[inside], exact.q, case.quaternions), run.t[inside]
+    return errors(truth, taken(run, inside), exact, case)
 
 
 def scale_of(exact: Trajectory, case: Case) -> Floats:

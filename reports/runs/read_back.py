@@ -9,7 +9,7 @@ import csv
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,10 @@ import pyarrow.parquet as pq
 from crossbody.cases import Ledger, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.errors import OwnFault
-from crossbody.cases.rotations import differences
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Row
-from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.alignment import aligned, clock
+from crossbody.reports.measuring.apart import errors
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, as_plain, load
@@ -232,12 +232,13 @@ def _errors(found: Trace, first: Trace, result: CaseResult, judged: Sequence[Row
         return
     touches, scales = case.law.touches, np.array(first.about["gap_scales"])
     gaps = np.abs(found.run.gap - found.truth.gap) / np.where(scales > 0.0, scales, 1.0)
-    positions = differences(found.run.q, found.truth.q, case.quaternions) / np.array(first.about["scales"])
-    apart = {"position": positions, "gap_error": gaps[:, touches]}
     known = ~np.isnan(found.truth.q).all(axis=1)
+    beside = replace(found.truth, t=clock(truth, found.run))
+    positions = errors(truth, found.run, beside, case)[0] / np.array(first.about["scales"])
+    apart = {"position": positions, "gap_error": gaps[known][:, touches]}
     for row in judged:
         if row["metric"] in apart and (row["engine"], row["profile"]) == (entry.engine, entry.profile):
-            value, said = float(np.max(apart[row["metric"]][known], initial=0.0)), row["value"]
+            value, said = float(np.max(apart[row["metric"]], initial=0.0)), row["value"]
             if math.isfinite(said) and not abs(value - said) <= SAME * max(value, said):
                 yield f"its {row['metric']}, {value:g}, not {said:g}"
 
