@@ -40,13 +40,14 @@ def unseen(case: Case, truth: Truth, outside: Callable[[str, float], bool]) -> I
 
     Args:
         case: with its metrics.
-        truth: up to where it is trusted.
+        truth: up to where it is trusted. What errors grow by, and metrics leave room for, is left out: the motion is
+            known exactly here.
         outside: whether a number of a metric, off by a fault, is judged as outside wherever it is judged.
     """
     run = _whole(truth.trajectory)
     if not all(np.isfinite(getattr(run, name)).all() for name in ("t", "q", "v", "gap", "lam", "energy")):
         return
-    known, every = replace(truth, trajectory=run, at=recorded(run)), metrics.of(case)
+    known, every = replace(truth, trajectory=run, at=recorded(run), grows=1.0), metrics.of(case)
     held = _held(known, run, case)
     plain: dict[tuple[str, int], float | None] = {}
     blind: set[str] = set()

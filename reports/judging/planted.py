@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats, distinct
+from crossbody.cases.contacts import contacts
 from crossbody.reports.measuring.equations import equations, spread
 from crossbody.reports.measuring.friction import slips
 from crossbody.reports.measuring.scale import rounded
@@ -443,9 +444,12 @@ def _last_contact(plain: Plain) -> tuple[int, float, float] | None:
 
 def touches(plain: Plain) -> Iterator[Control]:
     """Record a touch too early: by a part of the fall onto it, and by a hair."""
-    run = plain.run
+    run, case = plain.run, plain.case
+    begun = {(one.row, one.touch) for one in contacts(run, case.law.touches, case.general)}  # not what rounding parts
     for event in run.events:
         if not (event.before == Mode.FREE and event.after in PUSHES) or not event.t > run.t[0]:
+            continue
+        if (event.contact, event.t) not in begun:
             continue
         gap = np.abs(run.gap[:, event.contact])
         off = 0.05 * _since_last(run, event)

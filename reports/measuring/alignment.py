@@ -7,7 +7,8 @@ truth's instants; how far they were off is a number of its own (metric event_tim
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from bisect import bisect
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -27,13 +28,44 @@ _Pairs = list[tuple[Contact, Contact]]
 
 
 def matched(truth: Truth, run: Trajectory) -> _Pairs:
-    """Contacts of truth and run, paired in order up to the first of another row or not trusted."""
-    pairs: _Pairs = []
-    for a, b in zip(*map(truth.contacts, (truth.trajectory, run)), strict=False):
-        if a.row != b.row or a.touch > truth.trusted:
-            break
-        pairs.append((a, b))
-    return pairs
+    """Contacts of truth and run, each row's in order, as far as the truth is trusted; by the truth's touches.
+
+    Where a row has more of them in one, those are left out without which the others are shifted least. In which order
+    rows touch does not matter: of those that touch together rounding decides which is first.
+    """
+    theirs, mine = (_by_row(truth.contacts(motion)) for motion in (truth.trajectory, run))
+    pairs = [
+        pair for row, known in theirs.items()
+        for pair in _in_order([a for a in known if not a.touch > truth.trusted], mine.get(row, []))
+    ]  # fmt: skip
+    return sorted(pairs, key=lambda pair: pair[0].touch)
+
+
+def _by_row(contacts: Iterable[Contact]) -> dict[int, list[Contact]]:
+    found: dict[int, list[Contact]] = {}
+    for contact in contacts:
+        found.setdefault(contact.row, []).append(contact)
+    return found
+
+
+def _in_order(some: Sequence[Contact], others: Sequence[Contact]) -> _Pairs:
+    """Pair contacts of one row in order: as many as there can be, with the least sum of shifts of touches."""
+    if len(some) > len(others):
+        return [(a, b) for b, a in _in_order(others, some)]
+    spare = len(others) - len(some)
+    if not spare:
+        return list(zip(some, others, strict=True))
+    costs, chosen = np.zeros(spare + 1), np.empty((len(some), spare + 1), np.intp)
+    for i, one in enumerate(some):  # costs[k]: of the pairs so far if at most k of the others are left out
+        costs = costs + np.abs(one.touch - np.array([other.touch for other in others[i : i + spare + 1]]))
+        chosen[i] = np.maximum.accumulate(np.where(costs <= np.minimum.accumulate(costs), np.arange(spare + 1), 0))
+        costs = costs[chosen[i]]
+    left = spare
+    pairs = []
+    for i in reversed(range(len(some))):
+        left = chosen[i][left]
+        pairs.append((some[i], others[i + left]))
+    return pairs[::-1]
 
 
 def turns(run: Trajectory) -> list[tuple[float, int, Mode]]:
@@ -55,14 +87,21 @@ def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
         mine, theirs = turns(run), turns(truth.trajectory)
         if [one[1:] for one in mine] == [one[1:] for one in theirs]:
             knots += [(b[0], a[0]) for a, b in zip(theirs, mine, strict=True)]
-    kept = [(start, start)]
-    for knot in sorted(knots) if releases else knots:
-        if knot[0] > kept[-1][0] and knot[1] > kept[-1][1]:
-            kept.append(knot)
-    here, there = np.array(kept).T
+    here, there = _rising(start, knots)
     late = np.maximum(run.t - here[-1], 0.0)
     mapped: Floats = np.interp(run.t, here, there) + late
     return mapped
+
+
+def _rising(start: float, knots: Iterable[tuple[float, float]]) -> tuple[Floats, Floats]:
+    """Return instants of the run (k,) and the truth's for them (k,), s: of knots that cross the nearest stay."""
+    here, there = [start], [start]
+    for mine, theirs in sorted(knots, key=lambda knot: abs(knot[1] - knot[0])):
+        at = bisect(here, mine)
+        if at and here[at - 1] < mine and there[at - 1] < theirs and (at == len(here) or theirs < there[at]):
+            here.insert(at, mine)
+            there.insert(at, theirs)
+    return np.array(here), np.array(there)
 
 
 @remembered(4)
