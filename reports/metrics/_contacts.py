@@ -45,7 +45,7 @@ def constraint_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def event_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Instants of touch and release against the truth's, matched in order.
+    """Instants of touch and release against the truth's, each row's in order.
 
     Max |t - t_truth| over matched touches and releases, s, or less where the gap, or the multiplier, comes near
     zero slowly (`measuring.instants`); None where nothing touches. A contact that the run or the truth does not
@@ -175,7 +175,7 @@ def _other_friction(run: Trajectory, case: Case, light: float) -> NDArray[np.boo
 
 
 def mode_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Instants of hand-over and release against the truth's, contacts matched in order.
+    """Instants of hand-over and release against the truth's, each row's in order.
 
     Max |t - t_truth| over all that matched contacts have in both, s; None where there is none. A hand-over
     is from COLLISION to CONTACT; a row is free at its release or, let go below the surface, where it comes
