@@ -15,6 +15,7 @@ from crossbody.reports.figures.styles import called, label, style
 from crossbody.reports.judging.told import beyond, lacking, telling
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
+from crossbody.reports.pages.errors import farthest_off
 from crossbody.reports.pages.friction import friction, hysteresis
 from crossbody.reports.pages.html import Link, Page
 from crossbody.reports.pages.playback import playback
@@ -127,9 +128,12 @@ def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[S
         return []
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
     drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES}
+    tables = {"motion": farthest_off(traces)}
     return [
-        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces, limits), plots=plots)
-        for name, plots in drawn.items() if plots
+        Section(
+            name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces, limits), plots=plots,
+            tables=tables.get(name, ()),
+        ) for name, plots in drawn.items() if plots
     ]  # fmt: skip
 
 

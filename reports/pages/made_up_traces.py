@@ -116,7 +116,7 @@ def lines(figure: Any, at: str) -> dict[str, tuple[Floats, Floats]]:
     """Return the finite points x, y of the line of each engine on a y axis."""
     found = {}
     for line in figure["data"]:
-        if line.get("yaxis", "y") == at:
+        if line.get("yaxis", "y") == at and line.get("mode") != "markers":
             x, y = numbers(line["x"]), numbers(line["y"])
             known = np.isfinite(x) & np.isfinite(y)
             found[line["meta"]] = x[known], y[known]

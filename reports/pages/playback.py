@@ -16,6 +16,7 @@ from crossbody.reports.figures.section import Section
 from crossbody.reports.figures.styles import coded, label, style
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.pages.errors import told
 from crossbody.reports.pages.figures import carrying
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace
@@ -42,8 +43,8 @@ def playback(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     if not name:  # a log that was replayed has none
         return []
     if name not in scenes.names():
-        told = f"There is no picture of the mechanism {name}."
-        return [Section(name="playback", title="Playback", text=told)]
+        why = f"There is no picture of the mechanism {name}."
+        return [Section(name="playback", title="Playback", text=why)]
     try:
         scene = packed(traces, scenes.load(name), share)
     except (KeyError, ValueError, IndexError, CrossbodyError) as error:
@@ -51,7 +52,7 @@ def playback(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     caption = f"Motion of {about['case']}, {about['variant']}, as {', '.join(map(label, traces))} computed it."
     return [
         Section(
-            name="playback", title="Playback", text=TEXT, template="playback.html",
+            name="playback", title="Playback", text=f"{TEXT} {told(traces)}".strip(), template="playback.html",
             context={"scene": scene, "caption": caption,
                      "frames": scene["stage"]["frames"], "events": bool(scene["events"]),
                      "compared": len(scene["tracks"]) > 1 and any(track["truth"] for track in scene["tracks"])},
