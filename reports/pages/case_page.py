@@ -51,7 +51,8 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
         beside=_beside(found, case),
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
-            *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
+            *_plots(traces, rows, share),
+            *hysteresis(traces, share, figures.limits_of(rows)), *friction(traces, share),
             *precision(found.out, case.label, rows, _walls(found, case), found.places), *studied(found.out, case.about),
             _runs(traces, case.about), *_audit(found, case), provenance(found.told),
         ],

@@ -279,10 +279,20 @@ def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None,
         label(trace): (float(np.nanmin(lam)), float(np.nanmax(lam))) for trace in traces
         if np.isfinite(lam := trace.run.lam[:, k]).any()
     }  # fmt: skip
+    return clipped(ends, _noise(traces))
+
+
+def clipped(
+    ends: Mapping[str, tuple[float, float]], noise: float
+) -> tuple[tuple[float, float] | None, dict[str, float]]:  # fmt: skip
+    """Return the ends of an axis where lines, by their ends, go far beyond the truth's, and how far which do.
+
+    None where the truth's are noise, or no line goes far.
+    """
     low, high = ends.get(TRUTH, (0.0, 0.0))
     reach = max(high, -low)
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
-    if max(far.values(), default=0.0) <= FAR * reach or reach <= _noise(traces):
+    if max(far.values(), default=0.0) <= FAR * reach or reach <= noise:
         return None, {}
     return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), far
 
@@ -331,14 +341,14 @@ def penetration(
         if contacts[k] not in turn:
             for limit, name in limits.get("constraint_drift" if on else "penetration", {}).items():
                 sheet.limit(row, limit, name)
-        for half, name in () if on else _gaps(traces[0], k, limits):
+        for half, name in () if on else gap_limits(traces[0], k, limits):
             sheet.band(row, half, name)
     sheet.logarithmic(*(row for row, on in enumerate(always) if on))
     return sheet.done()
 
 
-def _gaps(truth: Trace, k: int, limits: Limits) -> Iterator[tuple[float, str]]:
-    """How far the gap of a contact that can open may be from the truth's, and below the surface its depth."""
+def gap_limits(truth: Trace, k: int, limits: Limits) -> Iterator[tuple[float, str]]:
+    """Yield how far the gap of a contact that can open may be from the truth's, and below the surface its depth."""
     widths = {"gap_error": truth.about.get("gap_scales", ()), "penetration_error": _deepest(truth)}
     for metric, width in widths.items():
         for limit, name in limits.get(metric, {}).items() if k < len(width) else ():

@@ -102,6 +102,20 @@ def _loops() -> Iterator[Said]:
             yield f"force of {CONTACTS[k]} of {who}", found[who][1], one.run.lam[:, k]
 
 
+def _far() -> Iterator[Said]:
+    """Yield that a force far beyond the truth's is off the plot of its loop, whose title says how far and whose."""
+    one = drawn().traces
+    far = replace(one[2], run=replace(one[2].run, lam=37.7 * one[2].run.lam))
+    (section,) = friction.hysteresis([*one[:2], far])
+    for plot in section.plots:
+        k, layout = CONTACTS.index(plot.choice), plot.figure["layout"]  # type: ignore[index]
+        unit, own = "N m" if plot.choice in TURNING else "N", one[0].run.lam[:, k]
+        said = f"Off scale: {WHO[2]} up to {float(np.abs(far.run.lam[:, k]).max()):.3g} {unit} ({plot.choice})"
+        yield f"what is off the loop of {plot.choice}", float(said in layout["title"]["text"]), 1.0
+        low, high = layout["yaxis"]["range"]
+        yield f"the axis of the loop of {plot.choice}", [low, high], [1.5 * own.min(), 1.5 * own.max()]
+
+
 def _scene() -> Scene:
     """Return a ball on three slides over a floor: its slip is its velocity."""
     slides = zip("xyz", map(tuple, np.eye(3).tolist()), strict=True)
@@ -142,4 +156,5 @@ def _sides() -> Iterator[Said]:
 
 KINDS = {
     "playback": _playback, "loops of force": _loops, "friction figures": _friction, "loops": _sides,
+    "loops off scale": _far,
 }  # fmt: skip
