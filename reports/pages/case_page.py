@@ -47,13 +47,13 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
         name=case.page, title=case.label, lead=_lead(case.about), word=grid.verdict(rows),
-        engines=[{"name": label(trace), "shown": called(trace), **style(trace, i)} for i, trace in enumerate(traces)],
+        engines=[{"name": label(trace), "shown": called(trace), **style(trace)} for trace in traces],
         beside=_beside(found, case),
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
             *_plots(traces, rows, share),
             *hysteresis(traces, share, figures.limits_of(rows)), *friction(traces, share),
-            *precision(found.out, case.label, rows, _walls(found, case), found.places), *studied(found.out, case.about),
+            *precision(found.out, case.label, rows, _walls(found, case)), *studied(found.out, case.about),
             _runs(traces, case.about), *_audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip

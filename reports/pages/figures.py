@@ -178,15 +178,15 @@ def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE,
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
     title = "Coordinates, and |measured minus predicted|" if of_log(traces[0].about) else MATCHED
     sheet = Sheet(rows, title, points, group=2)
-    for i, trace in enumerate(traces):
+    for trace in traces:
         t, q = filled(trace.run, trace.quaternions)
         drawn = errors.seen(q, traces[0])
         away = errors.off(trace) if trace.truth is not None else None
         for place, k in enumerate(shown):
-            sheet.line(trace, i, 2 * place, drawn[:, k], t)
+            sheet.line(trace, 2 * place, drawn[:, k], t)
             if away is not None:
                 floor = floors[names[k][1]]
-                sheet.line(trace, i, 2 * place + 1, np.maximum(away[:, k], floor), floor=floor)
+                sheet.line(trace, 2 * place + 1, np.maximum(away[:, k], floor), floor=floor)
     scales = traces[0].about.get("scales", ())
     least = min(limits.get("position", {}), default=0.0)
     every = np.concatenate([errors.seen(trace.run.q, traces[0]) for trace in traces])
@@ -226,10 +226,10 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
                 continue
-            sheet.line(trace, i, 3 * place, trace.run.lam[:, k])
-            sheet.line(trace, i, 3 * place + 1, summed[i][:, k])
+            sheet.line(trace, 3 * place, trace.run.lam[:, k])
+            sheet.line(trace, 3 * place + 1, summed[i][:, k])
             if (exact := true[i]) is not None:
-                sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor), floor=floor)
+                sheet.line(trace, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor), floor=floor)
         ends, far = robust(traces, k)
         if ends is not None:
             sheet.clip(3 * place, *ends)
@@ -302,16 +302,16 @@ def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
     rows = ["total energy\n[J]", "work of contacts\n[J]", "|unexplained|\n[J]"]
     sheet = Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points, group=3)
     floor = floor_of(traces[0].run.energy)
-    for i, trace in enumerate(traces):
+    for trace in traces:
         run = trace.run
-        sheet.line(trace, i, 0, run.total_energy)
+        sheet.line(trace, 0, run.total_energy)
         if run.ledger is None:
             continue
         work = run.ledger.contact.sum(axis=1)
         if work.any():
-            sheet.line(trace, i, 1, work)
+            sheet.line(trace, 1, work)
         book = work + run.ledger.input - run.ledger.dissipated
-        sheet.line(trace, i, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor), floor=floor)
+        sheet.line(trace, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor), floor=floor)
     sheet.logarithmic(2)
     for limit, name in limits.get("energy_integrator", {}).items():
         sheet.limit(2, limit * energy_of(traces[0].run), name)
@@ -334,10 +334,10 @@ def penetration(
     ]
     sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points, group=len(rows))
     for row, (k, on) in enumerate(zip(shown, always, strict=True)):
-        for i, trace in enumerate(traces):
+        for trace in traces:
             depth = _depth(trace.run.gap[:, k], on)
             above = np.where(np.isnan(depth), np.nan, np.nan if on else 0.0)  # none is seen on a logarithmic axis
-            sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, above))
+            sheet.line(trace, row, np.where(depth > ROUNDING, depth, above))
         if contacts[k] not in turn:
             for limit, name in limits.get("constraint_drift" if on else "penetration", {}).items():
                 sheet.limit(row, limit, name)
@@ -365,10 +365,10 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     """Length of every step at its start: small while a collision lasts, large again when it is over."""
     sheet = Sheet(["step size\n[s]"], "Step size of each engine", points)
     floor, usual = floor_of(traces[0].run.t), list[Floats]()
-    for i, trace in enumerate(traces):
+    for trace in traces:
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
         ends = starts[-1:] + lengths[-1:]  # the last step is drawn to its end too
-        sheet.line(trace, i, 0, np.maximum(np.r_[lengths, lengths[-1:]], floor), np.r_[starts, ends], shape="hv")
+        sheet.line(trace, 0, np.maximum(np.r_[lengths, lengths[-1:]], floor), np.r_[starts, ends], shape="hv")
         usual += [quantiles(lengths, REMAINDERS, 1.0)] if len(lengths) else []
     sheet.logarithmic(0)
     if usual:

@@ -68,14 +68,14 @@ def _numbered(name: str, i: int) -> str:
 
 def _loop(traces: Sequence[Trace], k: int, most: int, name: str, limits: Limits) -> Plot | None:
     """Force over depth of one contact in every engine, up to some times the truth's, and what is off that."""
-    points = {i: found for i, trace in enumerate(traces) if (found := _over_depth(trace, k, most))}
+    points = [(trace, found) for trace in traces if (found := _over_depth(trace, k, most))]
     if not points:
         return None
     contact = traces[0].about["contacts"][k]
     unit, kind = force_kind(traces, k)
     length = "m" if unit == "N" else "rad"
     told, axes = [f"Force over depth, contact {plain(contact)}"], list[dict[str, Any]]()
-    depths = {label(traces[i]): (float(np.nanmin(x)), float(np.nanmax(x))) for i, (x, _) in points.items()}
+    depths = {label(trace): (float(np.nanmin(x)), float(np.nanmax(x))) for trace, (x, _) in points}
     for (ends, far), one in ((clipped(depths, ROUNDING), length), (robust(traces, k), unit)):
         axes.append({"range": list(ends)} if ends else {})
         told += [f"Off scale: {off_scale({who: [(size, one, contact)] for who, size in far.items()})}"] if ends else []
@@ -90,13 +90,13 @@ def _loop(traces: Sequence[Trace], k: int, most: int, name: str, limits: Limits)
             {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in edges
         ],
     }  # fmt: skip
-    lines = [_drawn(traces[i], i, x, y, "lines") for i, (x, y) in points.items()]
+    lines = [_drawn(trace, x, y, "lines") for trace, (x, y) in points]
     return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact)
 
 
-def _drawn(trace: Trace, i: int, x: Floats, y: Floats, mode: str, **more: Any) -> dict[str, Any]:
+def _drawn(trace: Trace, x: Floats, y: Floats, mode: str, **more: Any) -> dict[str, Any]:
     """One line of one engine in a plane."""
-    look = style(trace, i)
+    look = style(trace)
     return {
         "type": "scatter", "mode": mode, "x": coded(x.astype(np.float32)), "y": coded(y.astype(np.float32)),
         "name": plain(label(trace)), "meta": label(trace),
@@ -143,8 +143,8 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
     """The cone, the plane and, where it is known, the slip of one contact in every engine."""
     name = contact.normals[place]
     forces = [_forces(trace, contact, place) for trace in traces]
-    cone = [_line(one, j, (forces[j][0][:, 0], forces[j][1]), most) for j, one in enumerate(traces)]
-    plane = [_line(one, j, forces[j][2], most) for j, one in enumerate(traces)]
+    cone = [_line(one, (forces[j][0][:, 0], forces[j][1]), most) for j, one in enumerate(traces)]
+    plane = [_line(one, forces[j][2], most) for j, one in enumerate(traces)]
     top = max(float(np.nanmax(rows[:, 0], initial=0.0)) for rows, *_ in forces)
     plots = [
         _plot("cone", i, f"Friction over normal force, {name}. Dashed: the bound, mu = {contact.friction:g}", cone,
@@ -153,7 +153,7 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
               ("friction t1 / bound", "friction t2 / bound"), [DISC], name),
     ]  # fmt: skip
     if contact.first.type == "plane":
-        slips = [_line(trace, j, _slipping(trace, contact, place), most) for j, trace in enumerate(traces)]
+        slips = [_line(trace, _slipping(trace, contact, place), most) for trace in traces]
         plots.append(_plot("slip", i, f"Slip, {name}", slips, ("slip t1 [m/s]", "slip t2 [m/s]"), [], name))
     return plots
 
@@ -195,7 +195,7 @@ def _slipping(trace: Trace, contact: Contact, place: int) -> tuple[Floats, Float
     return there[:, 0], there[:, 1]
 
 
-def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dict[str, Any]:
+def _line(trace: Trace, points: tuple[Floats, Floats], most: int) -> dict[str, Any]:
     """A line of one engine through evenly chosen samples and those beside its events."""
     x, y = points
     near = np.searchsorted(trace.run.t, [event.t for event in trace.run.events])[: most // 4]
@@ -203,7 +203,7 @@ def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dic
     free = ~np.isfinite(x + y)
     at = np.r_[at, np.flatnonzero(free[1:] & ~free[:-1]) + 1]  # a line ends where a contact opens
     at = distinct(at[(at >= 0) & (at < len(x))])
-    return _drawn(trace, i, x[at], y[at], "lines+markers", marker={"size": 4})
+    return _drawn(trace, x[at], y[at], "lines+markers", marker={"size": 4})
 
 
 def _plot(

@@ -93,7 +93,7 @@ def index_pages(found: Results) -> list[Page]:
             title=_title(found) if i == 0 else f"Cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
             lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
             word=grid.verdict(found.verdicts),
-            engines=[{"name": who, "shown": who, **look(place)} for who, place in found.places.items()],
+            engines=[{"name": who, "shown": who, **look(who)} for who in found.engines],
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.reports.figures.styles import COLOURS
+from crossbody.reports.figures.styles import look
 from crossbody.reports.pages import errors, figures, sheet
 from crossbody.reports.pages.made_up_traces import (
     CONTACTS,
@@ -20,7 +20,6 @@ from crossbody.reports.pages.made_up_traces import (
     NAMES,
     OFF,
     ON,
-    PLACES,
     TURNING,
     UNITS,
     WHO,
@@ -59,9 +58,8 @@ def _lines(figure: Any, at: str, what: str, wanted: Mapping[str, tuple[Floats, F
         yield f"{what} of {who}", found[who][1], y
     for line in figure["data"]:
         if line.get("yaxis", "y") == at and line["meta"] != WHO[0] and line["name"]:
-            place = PLACES[WHO.index(line["meta"])]
             yield f"colour and name of {what} of {line['meta']}", (line["line"]["color"], line["name"]), (
-                COLOURS[place], line["meta"],
+                look(line["meta"])["color"], line["meta"],
             )  # fmt: skip
 
 
@@ -276,9 +274,9 @@ def _turning(angles: Sequence[Floats], t: Floats) -> list[Trace]:
         "scales": [2.0, 1.0, 1.0, 1.0, 1.0], "steps": ((), ()),
     }  # fmt: skip
     return [
-        Trace(about=about | {"engine": who.partition(":")[0], "profile": who.partition(":")[2], "place": place},
+        Trace(about=about | {"engine": who.partition(":")[0], "profile": who.partition(":")[2],},
               run=run, truth=runs[0] if i else None)
-        for i, (who, place, run) in enumerate(zip(WHO, PLACES, runs, strict=False))
+        for i, (who, run) in enumerate(zip(WHO, runs, strict=False))
     ]  # fmt: skip
 
 

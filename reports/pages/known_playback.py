@@ -13,14 +13,13 @@ from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_plain import plain
-from crossbody.reports.figures.styles import COLOURS
+from crossbody.reports.figures.styles import look
 from crossbody.reports.pages import friction, playback
 from crossbody.reports.pages.known_figures import drawn
 from crossbody.reports.pages.made_up_traces import (
     CONTACTS,
     OFF,
     ON,
-    PLACES,
     TURNING,
     WHO,
     Said,
@@ -72,7 +71,7 @@ def _track(i: int, track: Any) -> Iterator[Said]:
     yield f"blows of {who}", numbers(track["blows"]), _arrows(at, np.array(impulses)).reshape(len(struck), -1)
     yield f"whether {who} is the truth", float(track["truth"]), float(i == 0)
     if i:
-        yield f"colour of {who}", track["color"], COLOURS[PLACES[i]]
+        yield f"colour of {who}", track["color"], look(who)["color"]
 
 
 def _since(samples: Floats, lam: Floats, pictures: Floats) -> Iterator[Floats]:

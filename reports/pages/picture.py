@@ -49,7 +49,7 @@ class Film:
         self.parameters = {**trace.about["parameters"], "scene": trace.about.get("scene")}
         self.stage = self.scene.stage(self.parameters)
         self.t, self.q = filled(trace.run, trace.quaternions)
-        self.color = style(trace, i)["color"]
+        self.color = style(trace)["color"]
         self.lam = np.zeros_like(trace.run.lam)
         bearing = carrying([trace], idle(trace.run))
         self.lam[:, bearing] = np.nan_to_num(trace.run.lam[:, bearing])

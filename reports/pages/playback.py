@@ -69,7 +69,7 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene, share: float = 1.0) -> 
     pushing = _pushing(traces, scene, parameters, bearing)
     width = 1 + scene.poses(traces[0].run.q[:1], parameters)[0].size + 2 * stage.dimensions * int(pushing.sum())
     frames = int(np.clip(share * ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
-    drawn = [_track(trace, i, scene, parameters, frames, pushing) for i, trace in enumerate(traces) if len(trace.run.t)]
+    drawn = [_track(trace, scene, parameters, frames, pushing) for trace in traces if len(trace.run.t)]
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
         "end": max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0),
@@ -100,14 +100,14 @@ def events(run: Trajectory) -> list[float]:
 
 
 def _track(
-    trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int, pushing: NDArray[np.bool_]
+    trace: Trace, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int, pushing: NDArray[np.bool_]
 ) -> dict[str, Any]:  # fmt: skip
     run = trace.run
     t, q = filled(run, trace.quaternions)
     at = chosen(t, np.array([e.t for e in run.events]), frames)
     lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t[at], side="right"), 1))
     poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)[:, pushing]
-    look = style(trace, i)
+    look = style(trace)
     return {
         "name": label(trace), "color": look["color"], "strokes": look["strokes"],
         "truth": label(trace) == TRUTH, "t": _single(t[at]), "poses": _single(poses),

@@ -80,7 +80,7 @@ class Sheet:
         self.far.setdefault(who, []).append((size, unit, where))
 
     def line(
-        self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, floor: float = 0.0, **more: Any
+        self, trace: Trace, row: int, y: Floats, t: Floats | None = None, floor: float = 0.0, **more: Any
     ) -> None:  # fmt: skip
         """One line of one engine into plot `row`, thinned; what is not finite, or leaps from a floor, is a gap.
 
@@ -92,7 +92,7 @@ class Sheet:
         most = int(np.clip(SHARE * self.points / AROUND, 3, EVENTS))
         events = distinct([e.t for e in trace.run.events])[:most]
         at = keep(t, y, events, self.points - AROUND * len(events))
-        drawn_t, drawn_y, look = t[at], y[at], style(trace, i)
+        drawn_t, drawn_y, look = t[at], y[at], style(trace)
         if floor:
             long = np.flatnonzero(np.diff(t) > LONG * (t[-1] - t[0]))
             at = distinct(at, long, long + 1)
