@@ -283,8 +283,8 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float | No
     from crossbody.reports.pages import picture as drawing
     from crossbody.reports.pages.results import motion
 
-    trace, place = motion(folder, case, engine)
-    drawing.write(drawing.Film(trace, place), out, instant, fps, speed)
+    trace = motion(folder, case, engine)
+    drawing.write(drawing.Film(trace), out, instant, fps, speed)
     if as_json():
         result(json.dumps({"picture": str(out.absolute())}))
     elif not quiet():

@@ -79,7 +79,10 @@ def _loop(traces: Sequence[Trace], k: int, most: int, name: str, limits: Limits)
     for (ends, far), one in ((clipped(depths, ROUNDING), length), (robust(traces, k), unit)):
         axes.append({"range": list(ends)} if ends else {})
         told += [f"Off scale: {off_scale({who: [(size, one, contact)] for who, size in far.items()})}"] if ends else []
-    known = [f"±{half:.2g} {length} ({called})" for half, called in gap_limits(traces[0], k, limits)]
+    halves: dict[str, float] = {}
+    for half, called in gap_limits(traces[0], k, limits):  # the gap's and the depth's: the narrower counts
+        halves[called] = min(half, halves.get(called, half))
+    known = [f"±{half:.2g} {length} ({called})" for called, half in halves.items()]
     told += [f"Limits of the depth: {', '.join(known)} around the truth's"] if known else []
     edges = {} if length == "rad" else limits.get("penetration", {})
     layout = {

@@ -178,8 +178,8 @@ def check(against: Path | None, others: Sequence[Path]) -> None:
         beside.tables(other)
 
 
-def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
-    """One motion of a folder, "truth" or of an engine:profile, and its place among those of its case."""
+def motion(out: Path, case: str, engine: str) -> Trace:
+    """One motion of a folder, "truth" or of an engine:profile."""
     from crossbody.reports.figures.styles import label
 
     verdicts = verdicts_of(out)
@@ -196,7 +196,7 @@ def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
     place = next((i for i, name in enumerate(names) if engine in (name, name.partition(":")[0])), None)
     if place is None:
         raise InvalidValue(f"{out} has no motion of {engine} on {mine.label}; it has {_listed(names)}.")
-    return traces[place], place
+    return traces[place]
 
 
 def _listed(names: Iterable[str]) -> str:

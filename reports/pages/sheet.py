@@ -57,7 +57,7 @@ class Sheet:
         self.far: dict[str, list[tuple[float, str, str]]] = {}
         self.limits: list[tuple[int, float, str]] = []
         self.bands: list[tuple[int, float, str]] = []
-        self.sparse = False
+        self.sparse, self.end = False, 0.0
 
     def limit(self, row: int, value: float, name: str) -> None:
         """Draw what a plot's lines may reach and be within."""
@@ -89,6 +89,7 @@ class Sheet:
         t = trace.run.t if t is None else t
         if not len(t) or not np.isfinite(y).any():
             return
+        self.end = max(self.end, float(t[-1]))
         most = int(np.clip(SHARE * self.points / AROUND, 3, EVENTS))
         events = distinct([e.t for e in trace.run.events])[:most]
         at = keep(t, y, events, self.points - AROUND * len(events))
@@ -115,7 +116,7 @@ class Sheet:
             return
         self.sparse = True
         dots = {"type": "scatter", "x": coded(_times(t[at])), "name": "", "meta": label(trace), "mode": "markers",
-                "marker": {"size": 4, "color": color}}  # fmt: skip
+                "marker": {"size": 4, "color": color}, "cliponaxis": False}  # fmt: skip
         with np.errstate(over="ignore"):
             self.lines.append((row, y[at].astype(np.float32), dots))
 
@@ -174,6 +175,8 @@ class Sheet:
         for i, row in enumerate(drawn):
             span = [1.0 - (top + heights[i]) / inside, 1.0 - top / inside]
             axes |= _pair(number(i + 1), self.rows[row], [max(span[0], 0.0), span[1]], last[i])
+            if self.sparse and not i:  # dots would widen it
+                axes["xaxis"]["range"] = [0.0, self.end]
             if i + 1 == len(drawn):
                 axes[f"xaxis{number(i + 1)}"]["title"] = {"text": "time [s]"}
             if row in self.ranges:
