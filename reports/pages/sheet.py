@@ -263,7 +263,7 @@ def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None,
         "height": 150 + 18 * len({bar["y"][0] for bar in bars}),
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
         "xaxis": {"title": {"text": "time [s]"}, "range": [0.0, float(traces[0].run.t[-1])]},
-        "yaxis": {"automargin": True, "tickfont": {"size": 10}},
+        "yaxis": {"automargin": True, "tickfont": {"size": 10}, "dtick": 1},  # every strip has its name
     }  # fmt: skip
     return {"data": bars, "layout": layout}
 
