@@ -20,7 +20,7 @@ from crossbody.reports.pages.friction import friction, hysteresis
 from crossbody.reports.pages.html import Link, Page
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
-from crossbody.reports.pages.results import CaseFiles, Results
+from crossbody.reports.pages.results import CaseFiles, Results, at_rest
 from crossbody.reports.runs.store import Trace
 
 PLOTTED = 900_000  # room for all plots of a page, bytes; the samples of each line follow from it
@@ -46,7 +46,8 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     """All sections of one case, with a share of the usual room; its motions are forgotten with the page."""
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
-        name=case.page, title=case.label, lead=_lead(case.about), word=grid.verdict(rows),
+        name=case.page, title=case.label, lead=f"{_lead(case.about)} {at_rest([case])}".strip(),
+        word=grid.verdict(rows),
         engines=[{"name": label(trace), "shown": called(trace), **style(trace)} for trace in traces],
         beside=_beside(found, case),
         sections=[

@@ -20,7 +20,7 @@ from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
 from crossbody.reports.pages.html import BEYOND, Page
 from crossbody.reports.pages.precision import overview
-from crossbody.reports.pages.results import CaseFiles, Results
+from crossbody.reports.pages.results import CaseFiles, Results, at_rest
 from crossbody.reports.pages.summary import deviations, engines
 from crossbody.reports.runs.store import load
 from crossbody.reports.runs.thin import keep
@@ -91,7 +91,7 @@ def index_pages(found: Results) -> list[Page]:
         Page(
             name=name,
             title=_title(found) if i == 0 else f"Cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
-            lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
+            lead=f"{sentence(runs_of(found.verdicts))} {at_rest(found.cases)}".strip() if found.verdicts else "",
             word=grid.verdict(found.verdicts),
             engines=[{"name": who, "shown": who, **look(who)} for who in found.engines],
             sections=_sections(found, cases, names, i),

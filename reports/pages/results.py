@@ -18,6 +18,8 @@ from crossbody.reports.runs.output import is_staged, recover
 from crossbody.reports.runs.store import Trace, load, peek
 from crossbody.reports.runs.study import check_fields, read_json
 
+NAMED = 3
+"""Cases in which nothing moves that are named."""
 NUMBER = (int, float, type(None))
 JUDGED = {name: NUMBER if kind is float else (str,) for name, kind in COLUMNS.items()}
 AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
@@ -157,9 +159,17 @@ def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], T
     return found, times
 
 
-def times_of(out: Path) -> Times:
-    """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile."""
-    return _cases(out, verdicts_of(out))[1]
+def times_of(out: Path) -> tuple[Times, str]:
+    """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile; what rests."""
+    cases, times = _cases(out, verdicts_of(out))
+    return times, at_rest(cases)
+
+
+def at_rest(cases: Sequence[CaseFiles]) -> str:
+    """Say in which cases nothing moves, so that verdicts on them say little of motions; nothing if there are none."""
+    still = [case.label for case in cases if case.about.get("still")]
+    named = ", ".join(still[:NAMED]) + (f" and {len(still) - NAMED} more" if len(still) > NAMED else "")
+    return f"Nothing moves in {named}: the truth stays where it starts." if still else ""
 
 
 def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:
