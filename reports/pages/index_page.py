@@ -147,7 +147,11 @@ def _worst(found: Results, case: CaseFiles) -> str:
     held = [row for row in found.rows.get(case.label, ()) if grid.held(row) and share(row) > 0.0]
     known = [row for row in held if row["verdict"] in WRONG or math.isfinite(share(row))]
     row = min(known, key=lambda row: (grid.RANKED.index(row["verdict"]), *telling(row)), default=None)
-    return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}" if row else ""
+    if row is None:
+        return ""
+    far = row["value"] is not None and row["value"] > 1.0  # many times what hardly moves is no size that one knows
+    more = f" ({row['where']})" if far and row.get("where") else ""
+    return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}{more}"
 
 
 def _sketch(case: CaseFiles) -> str:

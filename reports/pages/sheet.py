@@ -26,7 +26,7 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 group, between groups (with times), pixels."""
 NAME = 12  # height of the name of a line beside its plot, pixels
 SEEN = 6  # height of a band that is seen around the truth, pixels
-NARROW = 4  # plots whose limits around the truth are said, where they are narrower than its line
+NARROW = 4  # limits around the truth that are said, where they are narrower than its line
 LONG = 0.02  # part of the horizon: a line of errors is broken where a run has no sample for longer
 LEAP = 100.0  # times a floor: a line that goes from there farther within one sample is broken
 DIGITS = 12  # of the mantissa of a value on a logarithmic axis, bits: four decimal ones
@@ -140,15 +140,18 @@ class Sheet:
     def _seen(self) -> tuple[dict[int, list[tuple[float, str]]], list[str]]:
         """Half widths and names of the bands that are wider than the line that they are around, and what others are."""
         found: dict[int, list[tuple[float, str]]] = {}
-        narrow: dict[str, list[str]] = {}
+        narrow: dict[int, dict[str, None]] = {}
         for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
             seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
             if 2.0 * half * PLOT > SEEN * np.ptp(seen):
                 found.setdefault(row, []).append((half, name))
             else:
-                title, _, unit = self.rows[row].partition("\n")
-                narrow.setdefault(title, []).append(f"±{half:.2g} {unit.strip('[]')} ({name})")
-        return found, [f"{title} {', '.join(each)}" for title, each in narrow.items()]
+                unit = self.rows[row].partition("\n")[2].strip("[]")
+                narrow.setdefault(row, {})[f"±{half:.2g} {unit} ({name})"] = None
+        alike: dict[str, dict[str, None]] = {}
+        for row, texts in narrow.items():
+            alike.setdefault(", ".join(texts), {})[self.rows[row].partition("\n")[0]] = None
+        return found, [f"{', '.join(titles)} {text}" for text, titles in alike.items()]
 
     def _caption(
         self, drawn: Sequence[int], bands: Mapping[int, Sequence[tuple[float, str]]], narrow: Sequence[str]
@@ -158,7 +161,7 @@ class Sheet:
         told += [f"Off scale: {off_scale(self.far)}"] if self.far else []
         names = dict.fromkeys(name for each in bands.values() for _, name in each)
         told += [f"Grey around the truth: {', '.join(names)}"] if names else []
-        more = f"; and of {len(narrow) - NARROW} more" if len(narrow) > NARROW else ""
+        more = f"; and {len(narrow) - NARROW} more" if len(narrow) > NARROW else ""
         told += [f"Limits narrower than a line: {'; '.join(narrow[:NARROW])}{more}"] if narrow else []
         told += ["Dots: the ends of long steps, between which no error is known"] if self.sparse else []
         return ". ".join([self.title, *told])
