@@ -29,6 +29,7 @@ from crossbody.reports.runs.thin import keep
 from crossbody.reports.scenes.scene import slip
 
 MOST_CONTACTS = 6  # of which one can be chosen
+DOT = 3e-3  # part of a plot that a line is not seen below
 MOST_OF_DEPTH = 1500  # points of one engine's line
 OVER_DEPTH = (
     "Force over penetration depth of one contact. A spring gives a line; damping opens it to a loop "
@@ -93,8 +94,20 @@ def _loop(traces: Sequence[Trace], k: int, most: int, name: str, limits: Limits)
             {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in edges
         ],
     }  # fmt: skip
-    lines = [_drawn(trace, x, y, "lines") for trace, (x, y) in points]
+    wide = [max(float(np.nanmax(np.abs(one[axis]))) for _, one in points) for axis in (0, 1)]
+    lines = [
+        _drawn(trace, x, y, "lines+markers", marker={"size": 7}) if _one_place(x, y, wide) else _drawn(trace, x, y, "lines")
+        for trace, (x, y) in points
+    ]  # fmt: skip
     return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact)
+
+
+def _one_place(x: Floats, y: Floats, wide: Sequence[float]) -> bool:
+    """Whether a line is no longer than a dot of a plot that reaches so far: what lies still on a rigid floor."""
+    pressed = y > 0.0
+    return all(
+        float(np.ptp(one[pressed])) < DOT * most for one, most in zip((x, y), wide, strict=True) if pressed.any()
+    )
 
 
 def _drawn(trace: Trace, x: Floats, y: Floats, mode: str, **more: Any) -> dict[str, Any]:

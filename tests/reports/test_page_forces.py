@@ -114,6 +114,13 @@ def test_a_depth_far_beyond_the_truths_is_named_and_no_loop_is_a_line(run: Traje
     assert [line["x0"] for line in layout["shapes"]] == [2e-3]
 
 
+def test_what_lies_on_a_rigid_floor_is_a_dot(run: Trajectory) -> None:
+    lies = replace(run, gap=np.zeros_like(run.gap), lam=np.full_like(run.lam, 9.81))
+    (section,) = hysteresis([trace(lies), trace(run, "soft")])
+    modes = {line["name"]: line["mode"] for line in section.plots[0].figure["data"]}
+    assert modes == {f"{TRUTH}": "lines+markers", "soft:p": "lines"}
+
+
 def test_limits_that_are_narrower_than_a_line_are_said(run: Trajectory) -> None:
     for limit, said in ((1e-9, True), (0.5, False)):
         traces = [replace(one, about=one.about | {"scales": [2.0]}) for one in (trace(run), trace(run, "fake"))]
