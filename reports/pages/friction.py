@@ -96,18 +96,19 @@ def _loop(traces: Sequence[Trace], k: int, most: int, name: str, limits: Limits)
     }  # fmt: skip
     wide = [max(float(np.nanmax(np.abs(one[axis]))) for _, one in points) for axis in (0, 1)]
     lines = [
-        _drawn(trace, x, y, "lines+markers", marker={"size": 7}) if _one_place(x, y, wide) else _drawn(trace, x, y, "lines")
+        _drawn(trace, x, y, "lines+markers", marker={"size": 7})
+        if _one_place(x, y, wide)
+        else _drawn(trace, x, y, "lines")
         for trace, (x, y) in points
-    ]  # fmt: skip
+    ]
     return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact)
 
 
 def _one_place(x: Floats, y: Floats, wide: Sequence[float]) -> bool:
     """Whether a line is no longer than a dot of a plot that reaches so far: what lies still on a rigid floor."""
-    pressed = y > 0.0
-    return all(
-        float(np.ptp(one[pressed])) < DOT * most for one, most in zip((x, y), wide, strict=True) if pressed.any()
-    )
+    bears = np.isfinite(y) & (y != 0.0)
+    spans = [float(np.ptp(one[bears])) if bears.any() else np.inf for one in (x, y)]
+    return all(span < DOT * most or span == 0.0 for span, most in zip(spans, wide, strict=True))
 
 
 def _drawn(trace: Trace, x: Floats, y: Floats, mode: str, **more: Any) -> dict[str, Any]:
