@@ -35,7 +35,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from crossbody.cases import arguments
-from crossbody.cases.errors import CrossbodyError, InvalidValue, NoFile, SceneError, shown
+from crossbody.cases.errors import CrossbodyError, InvalidValue, KernelError, NoFile, SceneError, shown
 from crossbody.cases.public_names import KINDS, check, groups_of, what_is_missing
 
 _Made = TypeVar("_Made")
@@ -255,6 +255,8 @@ def sentence(error: BaseException) -> str | None:
     """
     frames = [frame.filename for frame in traceback.extract_tb(error.__traceback__)]
     own = [file for file in frames if file in _OWN]
+    if isinstance(error, KernelError) and not _OWN:  # nobody but crossbody has written a kernel
+        return None
     if isinstance(error, CrossbodyError):
         where = f" It was raised in {own[-1]}, line {_line_in(own[-1], error)}." if own else ""
         return f"{error}{where}"

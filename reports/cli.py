@@ -247,12 +247,19 @@ def analyse(**asked: Any) -> int:
 @speaks
 def report(folder: Path, **asked: Any) -> int:
     """Rewrite the pages of an earlier run."""
+    from crossbody.cases.errors import several
+    from crossbody.reports import layout
     from crossbody.reports.pages import site
+    from crossbody.reports.pages.figures import few
 
+    before = site.pages_of(folder)
     made = site.write(folder, **asked).absolute()
+    gone = sorted(before - site.pages_of(folder)) if asked["single_file"] else []
     if as_json():
         result(json.dumps({"report": str(made)}))
     elif not quiet():
+        if gone:
+            click.echo(layout.told(f"{several(len(gone), 'page')} removed, which {made.name} now holds: {few(gone)}."))
         click.echo(f"Report: {made}")
     return 0
 
@@ -283,8 +290,8 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float | No
     from crossbody.reports.pages import picture as drawing
     from crossbody.reports.pages.results import motion
 
-    trace, place = motion(folder, case, engine)
-    drawing.write(drawing.Film(trace, place), out, instant, fps, speed)
+    trace = motion(folder, case, engine)
+    drawing.write(drawing.Film(trace), out, instant, fps, speed)
     if as_json():
         result(json.dumps({"picture": str(out.absolute())}))
     elif not quiet():

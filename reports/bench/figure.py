@@ -26,17 +26,16 @@ def work_precision(rows: pd.DataFrame) -> Figure:
     decades = np.ptp(np.log10(finite.clip(lower=FLOOR))) if len(finite) else 0.0
     apart = max(1.0, float(decades) / MOST)
     edge = 10.0 * float(finite.max()) if len(finite) else 1.0
-    for i, ((case, engine, profile), group) in enumerate(
-        rows.groupby(["case", "engine", "profile"], sort=False), start=1
-    ):
+    for (case, engine, profile), group in rows.groupby(["case", "engine", "profile"], sort=False):
+        who = f"{engine}:{profile}"
         x = group["error"].astype(float)
-        label = f"{engine}:{profile}" if rows["case"].nunique() == 1 else f"{case} {engine}:{profile}"
+        label = who if rows["case"].nunique() == 1 else f"{case} {who}"
         told = {"name": label, "legendgroup": label}
         reached = np.isfinite(x)
         if reached.any():
-            _add(panels, group[reached], x[reached].clip(lower=FLOOR), told | _line(group[reached], look(i), apart))
+            _add(panels, group[reached], x[reached].clip(lower=FLOOR), told | _line(group[reached], look(who), apart))
         if not reached.all():  # no line leads there: nobody knows how far off they are
-            marks = {"mode": "markers", "marker": {"symbol": "x", "size": 8, "color": look(i)["color"]}}
+            marks = {"mode": "markers", "marker": {"symbol": "x", "size": 8, "color": look(who)["color"]}}
             _add(
                 panels,
                 group[~reached],

@@ -27,6 +27,7 @@ from crossbody.reports.runs import choice, output, study, watch
 from crossbody.reports.runs.choice import DEFAULT_ENGINES
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
+from crossbody.reports.sections import identify as identified
 from crossbody.reports.sections import replay as section
 
 GRACE = 2.0
@@ -165,6 +166,10 @@ def run_identify(
     more = {"warnings": pd.DataFrame({"text": list(fit.warnings)}), "metrics": _metrics(found, rows)}
     if not voice.told_as_json(tables | more):
         if not voice.quiet():
+            told_first = identified.summary(tables["identify"], tables["held_out"], len(fit.fitted), len(fit.held))
+            click.echo(layout.told(told_first) + "\n")
+            _say_log(found)
+            click.echo()
             for shown in tables.values():
                 print_rows(shown, 6, heads=HEADS, left_out=SPARED)
                 click.echo()
@@ -228,15 +233,22 @@ def _say_outside(rows: pd.DataFrame) -> None:
         click.echo(layout.told(f"outside: {who} {row['metric']} is {value}, {bound}. {row['why']}"))
 
 
-def _say(found: Comparison, metrics: pd.DataFrame) -> None:
-    told = metrics.assign(valid=list(map(layout.valid, metrics["expected"], metrics["limit"])))
-    click.echo(layout.told(f"{section.judged(told)} {section.explained(told)}") + "\n")
+def _say_log(found: Comparison) -> None:
+    """Say which log it was, and what of it is odd or not used, and why."""
     source = f"{replay.tier(found.log)}: {found.log.provenance.file}"
     click.echo(layout.told(f"{source} on {found.model}, {several(len(found.windows), 'window')}"))
     for one in replay.findings(found).to_dict(orient="records"):
         if one["what"] != "repair":
             place = f"{one['channel']}, row {one['row']}: " if one["channel"] else ""
             click.echo(layout.told(f"note: {place}{one['text']}"))
+    if (part := found.log.provenance.part) is not None:
+        click.echo(layout.told(f"note: Run {part} of the file alone is used (--part); the others are not."))
+
+
+def _say(found: Comparison, metrics: pd.DataFrame) -> None:
+    told = metrics.assign(valid=list(map(layout.valid, metrics["expected"], metrics["limit"])))
+    click.echo(layout.told(f"{section.judged(told)} {section.explained(told)}") + "\n")
+    _say_log(found)
     speed = metrics[metrics["metric"] == "speed"]
     metrics = metrics[metrics["metric"] != "speed"]
     units = metrics["unit"].map(lambda unit: unit_text(unit, " [{}]"))

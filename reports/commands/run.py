@@ -13,7 +13,7 @@ from crossbody.cases import Case, InvalidValue
 from crossbody.cases.errors import OwnFault
 from crossbody.engines.equations import answering, equations_of, has_equations
 from crossbody.reference.compiling import count
-from crossbody.reports import voice
+from crossbody.reports import layout, voice
 from crossbody.reports.commands import planned, repeated
 from crossbody.reports.commands.run_shown import counted, show, show_time
 from crossbody.reports.commands.shared import identity, key, where
@@ -73,8 +73,10 @@ def run(
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
             # Pages take longer than all but the engines: what they show is printed before them, and lost by nothing.
-            times = results.times_of(made)
+            times, rests = results.times_of(made)
             untold = _tell(rows, times, made, controlled=any(case.control is not None for case in cases))
+            if rests and not (voice.quiet() or voice.as_json()):
+                print(layout.told(rests))
             clock.append(perf_counter())
             from crossbody.reports.pages import (
                 read_again,

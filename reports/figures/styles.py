@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import colorsys
+import zlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,6 +19,18 @@ from crossbody.reports.runs.store import Trace
 # Okabe and Ito's colours: distinguished by colour-blind readers, on light and on dark.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#8C6D00", "#7F7FFF", "#9B59D0")
 DASHES = ("solid", "dash", "dot", "dashdot")
+LOOKS = {
+    "reference:compiled": "#0072B2", "mujoco:matched": "#E69F00", "pinocchio:law": "#009E73",
+    "mujoco:default": "#D55E00", "pinocchio:admm": "#CC79A7", "reference:cvode": "#56B4E9",
+    "pinocchio:impulse": "#8C6D00", "reference:ida": "#7F7FFF", "pinocchio:impulse_simultaneous": "#9B59D0",
+    "mujoco:as_is": "#D81B60", "drake:matched": "#00A6A6", "drake:continuous": "#7CB518",
+    "drake:default": "#4C8C2B", "dart:matched": "#A3A500", "dart:default": "#B5179E",
+    "exudyn:matched": "#8D6E63", "exudyn:default": "#C08A5A", "pymunk:matched": "#E75480",
+    "pymunk:default": "#5F7A8C",
+}  # fmt: skip
+"""Of the engines that come along: one has its colour on every page of every report; a dash goes with its place here."""
+OTHERS = 360
+"""Of how many colours, around the circle, that of any other engine is one."""
 STROKES = {"solid": "none", "dash": "7 4", "dot": "2 3", "dashdot": "7 3 2 3"}
 """The same dashes as lengths, for what plotly does not draw."""
 LEVEL = "#8a8a8a"
@@ -36,20 +50,29 @@ def called(trace: Trace) -> str:
     return str(trace.about.get("called", label(trace)))
 
 
-def style(trace: Trace, i: int) -> dict[str, Any]:
-    """Colour, dash and width of the trace at place i of a case; the truth is a broad grey line.
-
-    The place among all engines of a folder, where one is given, goes first: an engine looks the same on every page.
-    """
+def style(trace: Trace) -> dict[str, Any]:
+    """Colour, dash and width of a trace; the truth is a broad grey line."""
     if label(trace) == TRUTH:
         return {"color": "#888888", "dash": "solid", "width": 4, "strokes": "none"}
-    return look(trace.about.get("place", i))
+    return look(label(trace))
 
 
-def look(i: int) -> dict[str, Any]:
-    """Colour, dash and width of the engine at place i."""
-    dash = DASHES[(i + 2 * (i // len(COLOURS))) % len(DASHES)]  # like colours come with other dashes
-    return {"color": COLOURS[i % len(COLOURS)], "dash": dash, "width": 1.8, "strokes": STROKES[dash]}
+def look(who: str) -> dict[str, Any]:
+    """Colour, dash and width of an engine:profile, by its name alone, so that it looks the same everywhere."""
+    place = place_of(who)
+    dash = DASHES[(place + 2 * (place // len(COLOURS))) % len(DASHES)]  # like colours come with other dashes
+    return {"color": LOOKS.get(who) or _hue(place), "dash": dash, "width": 1.8, "strokes": STROKES[dash]}
+
+
+def place_of(who: str) -> int:
+    """Return the place of an engine:profile among those that come along, or a number that its name makes."""
+    return list(LOOKS).index(who) if who in LOOKS else zlib.crc32(who.encode()) % OTHERS
+
+
+def _hue(place: int) -> str:
+    """A colour of the circle that is seen on light and on dark."""
+    parts = colorsys.hls_to_rgb(place / OTHERS, 0.5, 0.55)
+    return "#" + "".join(f"{round(255 * part):02X}" for part in parts)
 
 
 def number(row: int) -> str:

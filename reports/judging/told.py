@@ -19,6 +19,8 @@ SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$
 FINISHED = "finished"  # the row that says whether a run came to its end
 _CLAUSE = re.compile(r"[:;,.](?:\s|$)")
 """What ends the first clause of a reason."""
+_WHERE = re.compile(r" by (\S+) (\S+) at ")
+"""How far a coordinate is off, and its unit, as a number of position says it."""
 NAMED = 3  # runs that the sentence names
 QUANTITIES = frozenset(
     {
@@ -133,9 +135,12 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     loose = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
     text = _counted(len(right) - len(known) - len(loose), len(ran), [run.who for run, _ in known])
     if known:
-        run, row = min(known, key=lambda one: telling(one[1]))
-        cause = _CLAUSE.split(row["why"])[0]
-        text += f" The largest deviation of {row['metric']}: {_off(run, row)}: {cause[:1].upper()}{cause[1:]}."
+        most = _largest(known)
+        metric = most[0][1]["metric"]
+        head = f"deviation of {metric}" if len(most) == 1 else f"deviations of {metric}, by unit"
+        causes = [_CLAUSE.split(row["why"])[0] for _, row in most]
+        each = [f"{_off(*one)}: {cause[:1].upper()}{cause[1:]}" for one, cause in zip(most, causes, strict=True)]
+        text += f" The largest {head}: {'; '.join(each)}."
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     for said, of_truth in (("Off", False), ("In doubt", True)):
@@ -145,6 +150,17 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         loose.sort(key=lambda one: -share(one[1]))
         text += f" Beyond a limit for a known cause, and not judged: {_named([_off(*one) for one in loose])}."
     return f"{text}{_known_until(runs)}"
+
+
+def _largest(known: Sequence[tuple[EngineRun, Row]]) -> list[tuple[EngineRun, Row]]:
+    """Return the number that tells most; of positions the largest of each unit, as no metre is part of a radian."""
+    first = min(known, key=lambda one: telling(one[1]))
+    found: dict[str, tuple[float, tuple[EngineRun, Row]]] = {}
+    for one in known:
+        said = _WHERE.search(one[1].get("where") or "") if one[1]["metric"] == first[1]["metric"] else None
+        if said and float(said[1]) > found.get(said[2], (-1.0,))[0]:
+            found[said[2]] = float(said[1]), one
+    return [one for _, one in found.values()] or [first]
 
 
 def _known_until(runs: Sequence[EngineRun]) -> str:
@@ -186,11 +202,12 @@ def _off(run: EngineRun, row: Row) -> str:
     if run.failed:
         return f"{run.who} on {run.label} (did not finish)"
     times = share(row)
-    unit = " of its largest value" if row.get("where") else unit_text(row.get("unit", ""))
-    size = f"{row['value']:.2g}{unit}, {times:.2g} times its limit" if math.isfinite(times) else row["verdict"]
+    size = row["verdict"]
+    if math.isfinite(times):
+        number = row.get("where") or f"{row['value']:.2g}{unit_text(row.get('unit', ''))}"
+        size = f"{number}, {times:.2g} times its limit"
     if row.get("unit") == "%" and math.isfinite(times):  # a share of the whole is no multiple of what it may lack
         size = f"{row['value']:.3g} %, where {valid(row['expected'], row['limit'])} % is valid"
-    size += f": {row['where']}" if row.get("where") else ""
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
 
 

@@ -17,6 +17,8 @@ ROUNDING = 1e-6
 and on those below it, as of closures, two programs agree to rounding alone, which is 1e-10 of it."""
 IDLE = 1e-3
 """Part of the forces that move a mechanism below which its rows carry nothing but noise."""
+STILL = 1e-9
+"""Part of a coordinate, or of a metre or radian, that is rounding and what tolerances leave, not motion."""
 KNOWN = 1e-8
 """Part of an energy that must move to measure what it is off by: rounding of the rest is 1e-7 of it."""
 
@@ -33,6 +35,13 @@ def energy(run: Trajectory) -> float:
     rests = max(1.0, RESTS / moved) if moved > 0.0 else 1.0
     carried = RESTS * float(np.nanmax(np.abs(run.lam), initial=0.0)) if moved < RESTS else 0.0
     return max(rests * float(run.energy[:, 0].max()), rests * float(np.ptp(run.energy[:, 1])), carried, known)
+
+
+def still(run: Trajectory) -> bool:
+    """Return whether nothing moves: coordinates stay where they start, to rounding, and rates at zero."""
+    sizes = np.maximum(1.0, np.abs(run.q).max(axis=0, initial=0.0))
+    rests = bool((np.ptp(run.q, axis=0) <= STILL * sizes).all()) if len(run.t) else False
+    return rests and float(np.max(np.abs(run.v), initial=0.0)) * float(run.t[-1] - run.t[0]) <= STILL * sizes.max()
 
 
 def of_like(largest: Floats, named: Sequence[Coordinate]) -> Floats:

@@ -15,11 +15,12 @@ from crossbody.reports.figures.styles import called, label, style
 from crossbody.reports.judging.told import beyond, lacking, telling
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
+from crossbody.reports.pages.errors import farthest_off
 from crossbody.reports.pages.friction import friction, hysteresis
 from crossbody.reports.pages.html import Link, Page
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
-from crossbody.reports.pages.results import CaseFiles, Results
+from crossbody.reports.pages.results import CaseFiles, Results, at_rest
 from crossbody.reports.runs.store import Trace
 
 PLOTTED = 900_000  # room for all plots of a page, bytes; the samples of each line follow from it
@@ -45,13 +46,15 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     """All sections of one case, with a share of the usual room; its motions are forgotten with the page."""
     traces, rows = case.traces(), found.rows.get(case.label, [])
     return Page(
-        name=case.page, title=case.label, lead=_lead(case.about), word=grid.verdict(rows),
-        engines=[{"name": label(trace), "shown": called(trace), **style(trace, i)} for i, trace in enumerate(traces)],
+        name=case.page, title=case.label, lead=f"{_lead(case.about)} {at_rest([case])}".strip(),
+        word=grid.verdict(rows),
+        engines=[{"name": label(trace), "shown": called(trace), **style(trace)} for trace in traces],
         beside=_beside(found, case),
         sections=[
             _glance(found, case), _verdicts(found, case), *playback(traces, share),
-            *_plots(traces, rows, share), *hysteresis(traces, share), *friction(traces, share),
-            *precision(found.out, case.label, rows, _walls(found, case), found.places), *studied(found.out, case.about),
+            *_plots(traces, rows, share),
+            *hysteresis(traces, share, figures.limits_of(rows)), *friction(traces, share),
+            *precision(found.out, case.label, rows, _walls(found, case)), *studied(found.out, case.about),
             _runs(traces, case.about), *_audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
@@ -127,9 +130,12 @@ def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[S
         return []
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
     drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES}
+    tables = {"motion": farthest_off(traces)}
     return [
-        Section(name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces, limits), plots=plots)
-        for name, plots in drawn.items() if plots
+        Section(
+            name=name, title=figures.FIGURES[name][0], text=figures.note(name, traces, limits), plots=plots,
+            tables=tables.get(name, ()),
+        ) for name, plots in drawn.items() if plots
     ]  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from crossbody.reports.measuring.impulse import true_impulse, with_collisions
 from crossbody.reports.measuring.scale import energy as energy_of
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.pages import errors
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.sheet import Sheet, alike, changing, modes
 from crossbody.reports.runs.store import Trace
@@ -99,13 +100,15 @@ def _largest(parts: Iterable[Floats], count: int) -> Floats:
 
 
 def farthest(traces: Sequence[Trace]) -> list[int]:
-    """Coordinates, those first whose errors are the largest of their size; quaternions last, judged by their angle."""
-    count = len(traces[0].about["coordinates"])
-    scales = traces[0].about.get("scales", ()) or _largest((trace.run.q for trace in traces), count)
-    scales = np.where(np.array(scales) > 0.0, scales, 1.0)
-    sizes = _largest(((t.run.q - t.truth.q) / scales for t in traces if t.truth is not None), count)
-    sizes[_turns(traces)] = 0.0
-    return _most(sizes)
+    """Coordinates, of each unit those first that are farthest off in it, and rotations, each by its first entry.
+
+    Of several units those that are farthest off for the largest coordinate of their unit.
+    """
+    names, sizes = errors.signals(traces[0]), errors.sizes(traces)
+    apart = _largest((errors.off(t) for t in traces if t.truth is not None), len(traces[0].about["coordinates"]))
+    for k, (_, unit) in names.items():
+        apart[k] /= sizes[unit]
+    return [k for k in _most(apart) if k in names]
 
 
 def still(traces: Sequence[Trace], limits: Limits = NONE) -> list[int]:
@@ -166,31 +169,34 @@ def switching(traces: Sequence[Trace]) -> list[int]:
 
 def motion(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, which: Sequence[int] = ()) -> Figure:
     """Coordinates of every engine, and under each log |difference to the truth|, impacts matched."""
-    names = [(c["name"], c["unit"]) for c in traces[0].about["coordinates"]]
+    names = errors.signals(traces[0])
     # One floor a unit, by the largest value in any run: a coordinate that stays at 0 has its neighbours' size.
-    sizes = _largest((trace.run.q for trace in traces), len(names))
+    sizes = _largest((trace.run.q for trace in traces), len(traces[0].about["coordinates"]))
     part = SENSED if of_log(traces[0].about) else EPS
-    floors = {unit: floor_of(sizes[[k for k, (_, u) in enumerate(names) if u == unit]], part) for _, unit in names}
+    floors = {unit: floor_of(sizes[[k for k in names if names[k][1] == unit]], part) for _, unit in names.values()}
     shown = which or sorted(farthest(traces)[:MOST_SIGNALS])
     rows = [text for k in shown for text in ("{}\n[{}]".format(*names[k]), f"|error|\n[{names[k][1]}]")]
     title = "Coordinates, and |measured minus predicted|" if of_log(traces[0].about) else MATCHED
     sheet = Sheet(rows, title, points, group=2)
-    for i, trace in enumerate(traces):
+    for trace in traces:
         t, q = filled(trace.run, trace.quaternions)
+        drawn = errors.seen(q, traces[0])
+        away = errors.off(trace) if trace.truth is not None else None
         for place, k in enumerate(shown):
-            sheet.line(trace, i, 2 * place, q[:, k], t)
-            if trace.truth is not None:
+            sheet.line(trace, 2 * place, drawn[:, k], t)
+            if away is not None:
                 floor = floors[names[k][1]]
-                sheet.line(trace, i, 2 * place + 1, apart(trace.run.q[:, k], trace.truth.q[:, k], floor), floor=floor)
+                sheet.line(trace, 2 * place + 1, np.maximum(away[:, k], floor), floor=floor)
     scales = traces[0].about.get("scales", ())
     least = min(limits.get("position", {}), default=0.0)
-    turns = _turns(traces)
+    every = np.concatenate([errors.seen(trace.run.q, traces[0]) for trace in traces])
     for place, k in enumerate(shown):
-        if k < len(scales) and k not in turns:
+        if k < len(scales):
+            size = 1.0 if k in traces[0].quaternions else scales[k]  # rad
             for limit, name in limits.get("position", {}).items():
-                sheet.limit(2 * place + 1, limit * scales[k], name)
-                sheet.band(2 * place, limit * scales[k], name)
-            _show_still(sheet, 2 * place, np.concatenate([trace.run.q[:, k] for trace in traces]), least * scales[k])
+                sheet.limit(2 * place + 1, limit * size, name)
+                sheet.band(2 * place, limit * size, name)
+            _show_still(sheet, 2 * place, every[:, k], least * size)
     sheet.logarithmic(*range(1, len(rows), 2))
     return sheet.done()
 
@@ -220,10 +226,10 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
                 continue
-            sheet.line(trace, i, 3 * place, trace.run.lam[:, k])
-            sheet.line(trace, i, 3 * place + 1, summed[i][:, k])
+            sheet.line(trace, 3 * place, trace.run.lam[:, k])
+            sheet.line(trace, 3 * place + 1, summed[i][:, k])
             if (exact := true[i]) is not None:
-                sheet.line(trace, i, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor), floor=floor)
+                sheet.line(trace, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor), floor=floor)
         ends, far = robust(traces, k)
         if ends is not None:
             sheet.clip(3 * place, *ends)
@@ -273,10 +279,20 @@ def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None,
         label(trace): (float(np.nanmin(lam)), float(np.nanmax(lam))) for trace in traces
         if np.isfinite(lam := trace.run.lam[:, k]).any()
     }  # fmt: skip
+    return clipped(ends, _noise(traces))
+
+
+def clipped(
+    ends: Mapping[str, tuple[float, float]], noise: float
+) -> tuple[tuple[float, float] | None, dict[str, float]]:  # fmt: skip
+    """Return the ends of an axis where lines, by their ends, go far beyond the truth's, and how far which do.
+
+    None where the truth's are noise, or no line goes far.
+    """
     low, high = ends.get(TRUTH, (0.0, 0.0))
     reach = max(high, -low)
     far = {who: max(b, -a) for who, (a, b) in ends.items() if max(b, -a) > BEYOND * reach}
-    if max(far.values(), default=0.0) <= FAR * reach or reach <= _noise(traces):
+    if max(far.values(), default=0.0) <= FAR * reach or reach <= noise:
         return None, {}
     return (BEYOND * min(low, -0.1 * reach), BEYOND * max(high, 0.1 * reach)), far
 
@@ -286,16 +302,16 @@ def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
     rows = ["total energy\n[J]", "work of contacts\n[J]", "|unexplained|\n[J]"]
     sheet = Sheet(rows, "Energy ledger: what the law made, and what the integrator made", points, group=3)
     floor = floor_of(traces[0].run.energy)
-    for i, trace in enumerate(traces):
+    for trace in traces:
         run = trace.run
-        sheet.line(trace, i, 0, run.total_energy)
+        sheet.line(trace, 0, run.total_energy)
         if run.ledger is None:
             continue
         work = run.ledger.contact.sum(axis=1)
         if work.any():
-            sheet.line(trace, i, 1, work)
+            sheet.line(trace, 1, work)
         book = work + run.ledger.input - run.ledger.dissipated
-        sheet.line(trace, i, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor), floor=floor)
+        sheet.line(trace, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor), floor=floor)
     sheet.logarithmic(2)
     for limit, name in limits.get("energy_integrator", {}).items():
         sheet.limit(2, limit * energy_of(traces[0].run), name)
@@ -318,21 +334,21 @@ def penetration(
     ]
     sheet = Sheet(rows, "Penetration, and drift of rows that are always on", points, group=len(rows))
     for row, (k, on) in enumerate(zip(shown, always, strict=True)):
-        for i, trace in enumerate(traces):
+        for trace in traces:
             depth = _depth(trace.run.gap[:, k], on)
             above = np.where(np.isnan(depth), np.nan, np.nan if on else 0.0)  # none is seen on a logarithmic axis
-            sheet.line(trace, i, row, np.where(depth > ROUNDING, depth, above))
+            sheet.line(trace, row, np.where(depth > ROUNDING, depth, above))
         if contacts[k] not in turn:
             for limit, name in limits.get("constraint_drift" if on else "penetration", {}).items():
                 sheet.limit(row, limit, name)
-        for half, name in () if on else _gaps(traces[0], k, limits):
+        for half, name in () if on else gap_limits(traces[0], k, limits):
             sheet.band(row, half, name)
     sheet.logarithmic(*(row for row, on in enumerate(always) if on))
     return sheet.done()
 
 
-def _gaps(truth: Trace, k: int, limits: Limits) -> Iterator[tuple[float, str]]:
-    """How far the gap of a contact that can open may be from the truth's, and below the surface its depth."""
+def gap_limits(truth: Trace, k: int, limits: Limits) -> Iterator[tuple[float, str]]:
+    """Yield how far the gap of a contact that can open may be from the truth's, and below the surface its depth."""
     widths = {"gap_error": truth.about.get("gap_scales", ()), "penetration_error": _deepest(truth)}
     for metric, width in widths.items():
         for limit, name in limits.get(metric, {}).items() if k < len(width) else ():
@@ -349,10 +365,10 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     """Length of every step at its start: small while a collision lasts, large again when it is over."""
     sheet = Sheet(["step size\n[s]"], "Step size of each engine", points)
     floor, usual = floor_of(traces[0].run.t), list[Floats]()
-    for i, trace in enumerate(traces):
+    for trace in traces:
         starts, lengths = (np.array(given, dtype=np.float64) for given in trace.about.get("steps", ((), ())))
         ends = starts[-1:] + lengths[-1:]  # the last step is drawn to its end too
-        sheet.line(trace, i, 0, np.maximum(np.r_[lengths, lengths[-1:]], floor), np.r_[starts, ends], shape="hv")
+        sheet.line(trace, 0, np.maximum(np.r_[lengths, lengths[-1:]], floor), np.r_[starts, ends], shape="hv")
         usual += [quantiles(lengths, REMAINDERS, 1.0)] if len(lengths) else []
     sheet.logarithmic(0)
     if usual:
@@ -386,20 +402,24 @@ def _ranked(name: str, traces: Sequence[Trace], limits: Limits) -> list[int]:
     return [k for k in SIGNALS[name][1](traces) if k not in rests]
 
 
-def _names(traces: Sequence[Trace], noun: str) -> list[str]:
-    """Names of coordinates or contacts."""
-    return [one if isinstance(one, str) else one["name"] for one in traces[0].about[noun]]
+def _names(traces: Sequence[Trace], noun: str) -> dict[int, str]:
+    """Names of coordinates, rotations among them, or of contacts, by their places."""
+    if noun == "contacts":
+        return dict(enumerate(traces[0].about[noun]))
+    return {k: name for k, (name, _) in errors.signals(traces[0]).items()}
 
 
 def note(name: str, traces: Sequence[Trace], limits: Limits = NONE) -> str:
     """What the reader of a figure must know."""
     told = [LOG_NOTE if name == "motion" and of_log(traces[0].about) else NOTES.get(name, "")]
+    if name == "motion" and traces[0].quaternions:
+        told.append(ROTATIONS)
     if name in SIGNALS:
         noun = SIGNALS[name][0]
         names, found = _names(traces, noun), _ranked(name, traces, limits)
         if len(found) > MOST_SIGNALS:
             told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
-        if name in IDLE_NOTES and (rest := [names[k] for k in range(len(names)) if k not in found]):
+        if name in IDLE_NOTES and (rest := [name for k, name in names.items() if k not in found]):
             told.append(f"{IDLE_NOTES[name]}: {few(_normals(rest))}.")
     if name == "energy" and (
         without := [label(one) for one in traces if one.run.ledger is None and label(one) != TRUTH]
@@ -438,6 +458,7 @@ def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
 
 
 MATCHED = "Coordinates, and |difference from the truth|, impacts matched"
+ROTATIONS = "A rotation is drawn by its angle from the truth's start, its error by the angle between both."
 LOG_NOTE = (
     "Every window starts from the measured state, where the difference is zero. Differences below a millionth of the "
     "largest value of that unit are cut off."

@@ -13,16 +13,28 @@ from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
 from crossbody.reports.figures.styles import LINE, coded, label, plain, style
-from crossbody.reports.pages.figures import carrying, force_kind
+from crossbody.reports.pages.figures import (
+    NONE,
+    ROUNDING,
+    Limits,
+    carrying,
+    clipped,
+    force_kind,
+    gap_limits,
+    robust,
+)
+from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import keep
 from crossbody.reports.scenes.scene import slip
 
 MOST_CONTACTS = 6  # of which one can be chosen
+DOT = 3e-3  # part of a plot that a line is not seen below
 MOST_OF_DEPTH = 1500  # points of one engine's line
 OVER_DEPTH = (
     "Force over penetration depth of one contact. A spring gives a line; damping opens it to a loop "
-    "whose area is the energy lost. A force below zero pulls. Hide an engine to see the loops of others larger."
+    "whose area is the energy lost. A force below zero pulls. Where an engine goes far beyond the truth, the axes end "
+    "at one and a half times the truth's largest, and the title says how far it goes."
 )
 DISC = {"type": "circle", "x0": -1.0, "y0": -1.0, "x1": 1.0, "y1": 1.0, "line": LINE}
 MOST = 1000  # points of one engine's line
@@ -33,14 +45,16 @@ TEXT = (
 )
 
 
-def hysteresis(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
-    """The section, with a share of the usual points.
+def hysteresis(traces: Sequence[Trace], share: float = 1.0, limits: Limits = NONE) -> list[Section]:
+    """The section, with a share of the usual points, and the limits of depths.
 
     Nothing where no contact that opens and closes carries anything.
     """
     found = _busiest(traces)
     most = _points(share * MOST_OF_DEPTH, len(found))
-    plots = [plot for i, k in enumerate(found) if (plot := _loop(traces, k, most, _numbered("plot-hysteresis", i)))]
+    plots = [
+        plot for i, k in enumerate(found) if (plot := _loop(traces, k, most, _numbered("plot-hysteresis", i), limits))
+    ]
     return [Section(name="hysteresis", title="Force over depth", text=OVER_DEPTH, plots=plots)] if plots else []
 
 
@@ -53,17 +67,58 @@ def _numbered(name: str, i: int) -> str:
     return f"{name}-{i + 1}" if i else name
 
 
-def _loop(traces: Sequence[Trace], k: int, most: int, name: str) -> Plot | None:
-    """Force over depth of one contact in every engine."""
-    lines = [line for i, trace in enumerate(traces) if (line := _over_depth(trace, i, k, most))]
+def _loop(traces: Sequence[Trace], k: int, most: int, name: str, limits: Limits) -> Plot | None:
+    """Force over depth of one contact in every engine, up to some times the truth's, and what is off that."""
+    points = [(trace, found) for trace in traces if (found := _over_depth(trace, k, most))]
+    if not points:
+        return None
     contact = traces[0].about["contacts"][k]
     unit, kind = force_kind(traces, k)
+    length = "m" if unit == "N" else "rad"
+    told, axes = [f"Force over depth, contact {plain(contact)}"], list[dict[str, Any]]()
+    depths = {label(trace): (float(np.nanmin(x)), float(np.nanmax(x))) for trace, (x, _) in points}
+    for (ends, far), one in ((clipped(depths, ROUNDING), length), (robust(traces, k), unit)):
+        axes.append({"range": list(ends)} if ends else {})
+        told += [f"Off scale: {off_scale({who: [(size, one, contact)] for who, size in far.items()})}"] if ends else []
+    halves: dict[str, float] = {}
+    for half, called in gap_limits(traces[0], k, limits):  # the gap's and the depth's: the narrower counts
+        halves[called] = min(half, halves.get(called, half))
+    known = [f"±{half:.2g} {length} ({called})" for called, half in halves.items()]
+    told += [f"Limits of the depth: {', '.join(known)} around the truth's"] if known else []
+    edges = {} if length == "rad" else limits.get("penetration", {})
     layout = {
-        "title": {"text": f"Force over depth, contact {plain(contact)}"}, "height": 420, "showlegend": False,
-        "xaxis": {"title": {"text": f"depth [{'m' if unit == 'N' else 'rad'}]"}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": f"{kind} [{unit}]"}, "exponentformat": "power", "rangemode": "tozero"},
+        "title": {"text": ". ".join(told)}, "height": 420, "showlegend": False,
+        "xaxis": {"title": {"text": f"depth [{length}]"}, "exponentformat": "power"} | axes[0],
+        "yaxis": {"title": {"text": f"{kind} [{unit}]"}, "exponentformat": "power", "rangemode": "tozero"} | axes[1],
+        "shapes": [
+            {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in edges
+        ],
     }  # fmt: skip
-    return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact) if lines else None
+    wide = [max(float(np.nanmax(np.abs(one[axis]))) for _, one in points) for axis in (0, 1)]
+    lines = [
+        _drawn(trace, x, y, "lines+markers", marker={"size": 7})
+        if _one_place(x, y, wide)
+        else _drawn(trace, x, y, "lines")
+        for trace, (x, y) in points
+    ]
+    return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact)
+
+
+def _one_place(x: Floats, y: Floats, wide: Sequence[float]) -> bool:
+    """Whether a line is no longer than a dot of a plot that reaches so far: what lies still on a rigid floor."""
+    bears = np.isfinite(y) & (y != 0.0)
+    spans = [float(np.ptp(one[bears])) if bears.any() else np.inf for one in (x, y)]
+    return all(span < DOT * most or span == 0.0 for span, most in zip(spans, wide, strict=True))
+
+
+def _drawn(trace: Trace, x: Floats, y: Floats, mode: str, **more: Any) -> dict[str, Any]:
+    """One line of one engine in a plane."""
+    look = style(trace)
+    return {
+        "type": "scatter", "mode": mode, "x": coded(x.astype(np.float32)), "y": coded(y.astype(np.float32)),
+        "name": plain(label(trace)), "meta": label(trace),
+        "line": {key: look[key] for key in ("color", "dash", "width")},
+    } | more  # fmt: skip
 
 
 def _busiest(traces: Sequence[Trace]) -> list[int]:
@@ -79,22 +134,17 @@ def _busiest(traces: Sequence[Trace]) -> list[int]:
     return []
 
 
-def _over_depth(trace: Trace, i: int, k: int, most: int) -> dict[str, object]:
-    """Force over depth of one engine while its contact carries, from no force on the surface and back; or empty."""
+def _over_depth(trace: Trace, k: int, most: int) -> tuple[Floats, Floats] | None:
+    """Depths and forces of one engine while its contact carries, from no force on the surface and back; or none."""
     depth, lam = -trace.run.gap[:, k], trace.run.lam[:, k]
     carries = np.isfinite(lam) & (lam != 0.0) & np.isfinite(depth)
     if not carries.any():
-        return {}
+        return None
     near = carries | np.append(carries[1:], False) | np.insert(carries[:-1], 0, False)
     unknown = ~np.isfinite(lam + depth)
     x, y = (np.where(unknown, np.nan, np.where(carries, values, 0.0))[near] for values in (depth, lam))
     at = distinct(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), most), np.flatnonzero(~carries[near]))
-    look = style(trace, i)
-    return {
-        "type": "scatter", "mode": "lines", "x": coded(x[at].astype(np.float32)),
-        "y": coded(y[at].astype(np.float32)), "name": plain(label(trace)), "meta": label(trace),
-        "line": {key: look[key] for key in ("color", "dash", "width")},
-    }  # fmt: skip
+    return x[at], y[at]
 
 
 def friction(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
@@ -110,8 +160,8 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
     """The cone, the plane and, where it is known, the slip of one contact in every engine."""
     name = contact.normals[place]
     forces = [_forces(trace, contact, place) for trace in traces]
-    cone = [_line(one, j, (forces[j][0][:, 0], forces[j][1]), most) for j, one in enumerate(traces)]
-    plane = [_line(one, j, forces[j][2], most) for j, one in enumerate(traces)]
+    cone = [_line(one, (forces[j][0][:, 0], forces[j][1]), most) for j, one in enumerate(traces)]
+    plane = [_line(one, forces[j][2], most) for j, one in enumerate(traces)]
     top = max(float(np.nanmax(rows[:, 0], initial=0.0)) for rows, *_ in forces)
     plots = [
         _plot("cone", i, f"Friction over normal force, {name}. Dashed: the bound, mu = {contact.friction:g}", cone,
@@ -120,7 +170,7 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
               ("friction t1 / bound", "friction t2 / bound"), [DISC], name),
     ]  # fmt: skip
     if contact.first.type == "plane":
-        slips = [_line(trace, j, _slipping(trace, contact, place), most) for j, trace in enumerate(traces)]
+        slips = [_line(trace, _slipping(trace, contact, place), most) for trace in traces]
         plots.append(_plot("slip", i, f"Slip, {name}", slips, ("slip t1 [m/s]", "slip t2 [m/s]"), [], name))
     return plots
 
@@ -162,20 +212,15 @@ def _slipping(trace: Trace, contact: Contact, place: int) -> tuple[Floats, Float
     return there[:, 0], there[:, 1]
 
 
-def _line(trace: Trace, i: int, points: tuple[Floats, Floats], most: int) -> dict[str, Any]:
+def _line(trace: Trace, points: tuple[Floats, Floats], most: int) -> dict[str, Any]:
     """A line of one engine through evenly chosen samples and those beside its events."""
     x, y = points
     near = np.searchsorted(trace.run.t, [event.t for event in trace.run.events])[: most // 4]
     at = distinct(np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1)
     free = ~np.isfinite(x + y)
     at = np.r_[at, np.flatnonzero(free[1:] & ~free[:-1]) + 1]  # a line ends where a contact opens
-    at, look = distinct(at[(at >= 0) & (at < len(x))]), style(trace, i)
-    return {
-        "type": "scatter", "mode": "lines+markers", "marker": {"size": 4},
-        "x": coded(x[at].astype(np.float32)), "y": coded(y[at].astype(np.float32)),
-        "name": plain(label(trace)), "meta": label(trace),
-        "line": {key: look[key] for key in ("color", "dash", "width")},
-    }  # fmt: skip
+    at = distinct(at[(at >= 0) & (at < len(x))])
+    return _drawn(trace, x[at], y[at], "lines+markers", marker={"size": 4})
 
 
 def _plot(

@@ -20,7 +20,7 @@ from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
 from crossbody.reports.pages.html import BEYOND, Page
 from crossbody.reports.pages.precision import overview
-from crossbody.reports.pages.results import CaseFiles, Results
+from crossbody.reports.pages.results import CaseFiles, Results, at_rest
 from crossbody.reports.pages.summary import deviations, engines
 from crossbody.reports.runs.store import load
 from crossbody.reports.runs.thin import keep
@@ -91,9 +91,9 @@ def index_pages(found: Results) -> list[Page]:
         Page(
             name=name,
             title=_title(found) if i == 0 else f"Cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
-            lead=sentence(runs_of(found.verdicts)) if found.verdicts else "",
+            lead=f"{sentence(runs_of(found.verdicts))} {at_rest(found.cases)}".strip() if found.verdicts else "",
             word=grid.verdict(found.verdicts),
-            engines=[{"name": who, "shown": who, **look(place)} for who, place in found.places.items()],
+            engines=[{"name": who, "shown": who, **look(who)} for who in found.engines],
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip
@@ -147,7 +147,11 @@ def _worst(found: Results, case: CaseFiles) -> str:
     held = [row for row in found.rows.get(case.label, ()) if grid.held(row) and share(row) > 0.0]
     known = [row for row in held if row["verdict"] in WRONG or math.isfinite(share(row))]
     row = min(known, key=lambda row: (grid.RANKED.index(row["verdict"]), *telling(row)), default=None)
-    return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}" if row else ""
+    if row is None:
+        return ""
+    far = row["value"] is not None and row["value"] > 1.0  # many times what hardly moves is no size that one knows
+    more = f" ({row['where']})" if far and row.get("where") else ""
+    return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}{more}"
 
 
 def _sketch(case: CaseFiles) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -12,15 +12,14 @@ import numpy as np
 
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.reports.figures.styles import COLOURS
-from crossbody.reports.pages import figures, sheet
+from crossbody.reports.figures.styles import look
+from crossbody.reports.pages import errors, figures, sheet
 from crossbody.reports.pages.made_up_traces import (
     CONTACTS,
     MANY,
     NAMES,
     OFF,
     ON,
-    PLACES,
     TURNING,
     UNITS,
     WHO,
@@ -30,6 +29,7 @@ from crossbody.reports.pages.made_up_traces import (
     bands,
     levels,
     lines,
+    numbers,
 )
 from crossbody.reports.runs.store import Trace
 
@@ -57,10 +57,9 @@ def _lines(figure: Any, at: str, what: str, wanted: Mapping[str, tuple[Floats, F
         yield f"instants of {what} of {who}", found[who][0], x
         yield f"{what} of {who}", found[who][1], y
     for line in figure["data"]:
-        if line.get("yaxis", "y") == at and line["meta"] != WHO[0]:
-            place = PLACES[WHO.index(line["meta"])]
+        if line.get("yaxis", "y") == at and line["meta"] != WHO[0] and line["name"]:
             yield f"colour and name of {what} of {line['meta']}", (line["line"]["color"], line["name"]), (
-                COLOURS[place], line["meta"],
+                look(line["meta"])["color"], line["meta"],
             )  # fmt: skip
 
 
@@ -259,8 +258,68 @@ def _named() -> Iterator[Said]:
     yield "what is off scale", f"{WHO[2]} up to {size:.3g} N" in figure["layout"]["title"]["text"], 1.0
 
 
+def _turning(angles: Sequence[Floats], t: Floats) -> list[Trace]:
+    """Return a truth and engines that turn about an axis by angles, and are off along x by a tenth of the angle."""
+    poses = [np.column_stack([0.1 * a, np.cos(a / 2.0), np.zeros((len(a), 2)), np.sin(a / 2.0)]) for a in angles]
+    one = drawn().traces[0].run
+    rests = np.zeros((len(t), 1))
+    runs = [
+        replace(one, t=t, q=q, v=np.column_stack([0.1 * rate, np.zeros((len(t), 2)), rate]), gap=rests, lam=rests,
+                energy=np.zeros((len(t), 2)), mode=np.zeros((len(t), 1), np.int8), events=(), ledger=None)
+        for q, a in zip(poses, angles, strict=True) for rate in (np.gradient(a, t),)
+    ]  # fmt: skip
+    units = {"x": "m", **{f"cube {entry}": "1" for entry in ("qw", "qx", "qy", "qz")}}
+    about = drawn().about | {
+        "coordinates": [{"name": name, "unit": unit} for name, unit in units.items()], "contacts": ("a",),
+        "scales": [2.0, 1.0, 1.0, 1.0, 1.0], "steps": ((), ()),
+    }  # fmt: skip
+    return [
+        Trace(about=about | {"engine": who.partition(":")[0], "profile": who.partition(":")[2],},
+              run=run, truth=runs[0] if i else None)
+        for i, (who, run) in enumerate(zip(WHO, runs, strict=False))
+    ]  # fmt: skip
+
+
+def _rotations() -> Iterator[Said]:
+    """Yield a rotation's angle from the start and the angle that it is off, their limits, and the farthest errors."""
+    t = np.linspace(0.0, 1.0, 101)
+    angles = [0.2 + 0.7 * t, 0.2 + 0.9 * t]
+    traces = _turning(angles, t)
+    figure = figures.motion(traces, MANY, LIMITS)
+    at, errs = axis(figure, "rotation cube", "[rad]"), axis(figure, "|error|", "[rad]")
+    for who, rate in zip(WHO, (0.7, 0.9), strict=False):
+        x, y = lines(figure, at)[who]
+        yield f"rotation of {who}", y, rate * x
+    yield "error of the rotation", lines(figure, errs)[WHO[1]][1][1:], np.abs(angles[1] - angles[0])[1:]
+    yield "limits of a rotation", [value for value, _ in levels(figure, errs)], [*LIMITS["position"]]
+    yield "rotations first", figures.farthest(traces), [1, 0]
+    (table,) = errors.farthest_off(traces)
+    wanted = {"m": ("x", 0.02), "rad": ("rotation cube", 0.2)}
+    yield "units of largest errors", tuple(row["unit"] for row in table.rows), tuple(wanted)
+    for row in table.rows:
+        name, size = wanted[row["unit"]]
+        yield f"farthest in {row['unit']}", (row["coordinate"], row["who"]), (name, WHO[1])
+        yield f"largest error in {row['unit']}, and when", [row["size"], row["t"]], [size, 1.0]
+
+
+def _sparse() -> Iterator[Said]:
+    """Yield that a line of errors is broken where a step is long, and that its ends are dots."""
+    t = np.concatenate([np.linspace(0.0, 0.3, 31), np.linspace(0.6, 0.9, 31), [1.0]])
+    figure = figures.motion(_turning([t, 1.1 * t + 0.01], t), MANY)
+    for unit, part in (("rad", 1.0), ("m", 0.1)):
+        at = axis(figure, "|error|", f"[{unit}]")
+        own = [line for line in figure["data"] if line["yaxis"] == at and line["meta"] == WHO[1]]
+        (line,), (dots,) = ([one for one in own if one["mode"] == mode] for mode in ("lines", "markers"))
+        gaps = np.flatnonzero(np.isnan(numbers(line["y"])))
+        yield f"breaks of |error| in {unit}", numbers(line["x"])[gaps - 1], [0.3, 0.9]
+        yield f"dots of |error| in {unit}", numbers(dots["x"]), [0.3, 0.6, 0.9, 1.0]
+        yield f"heights of dots in {unit}", numbers(dots["y"]), part * np.array([0.04, 0.07, 0.10, 0.11])
+    yield "what dots are", "Dots: the ends of long steps" in figure["layout"]["title"]["text"], 1.0
+
+
 KINDS = {
-    "motion figure": _motion, "force figure": _force, "energy figure": _energy, "penetration figure": _penetration,
+    "rotations": _rotations, "long steps": _sparse, "motion figure": _motion,
+    "force figure": _force, "energy figure": _energy, "penetration figure": _penetration,
     "step figure": _steps, "mode figure": _modes, "thinned lines": _thinned, "limit lines": _limits,
     "off scale": _named,
 }  # fmt: skip

@@ -13,14 +13,13 @@ from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.cases.scene_plain import plain
-from crossbody.reports.figures.styles import COLOURS
+from crossbody.reports.figures.styles import look
 from crossbody.reports.pages import friction, playback
 from crossbody.reports.pages.known_figures import drawn
 from crossbody.reports.pages.made_up_traces import (
     CONTACTS,
     OFF,
     ON,
-    PLACES,
     TURNING,
     WHO,
     Said,
@@ -72,7 +71,7 @@ def _track(i: int, track: Any) -> Iterator[Said]:
     yield f"blows of {who}", numbers(track["blows"]), _arrows(at, np.array(impulses)).reshape(len(struck), -1)
     yield f"whether {who} is the truth", float(track["truth"]), float(i == 0)
     if i:
-        yield f"colour of {who}", track["color"], COLOURS[PLACES[i]]
+        yield f"colour of {who}", track["color"], look(who)["color"]
 
 
 def _since(samples: Floats, lam: Floats, pictures: Floats) -> Iterator[Floats]:
@@ -100,6 +99,20 @@ def _loops() -> Iterator[Said]:
         for who, one in zip(WHO, traces, strict=True):
             yield f"depth of {CONTACTS[k]} of {who}", found[who][0], -one.run.gap[:, k]
             yield f"force of {CONTACTS[k]} of {who}", found[who][1], one.run.lam[:, k]
+
+
+def _far() -> Iterator[Said]:
+    """Yield that a force far beyond the truth's is off the plot of its loop, whose title says how far and whose."""
+    one = drawn().traces
+    far = replace(one[2], run=replace(one[2].run, lam=37.7 * one[2].run.lam))
+    (section,) = friction.hysteresis([*one[:2], far])
+    for plot in section.plots:
+        k, layout = CONTACTS.index(plot.choice), plot.figure["layout"]  # type: ignore[index]
+        unit, own = "N m" if plot.choice in TURNING else "N", one[0].run.lam[:, k]
+        said = f"Off scale: {WHO[2]} up to {float(np.abs(far.run.lam[:, k]).max()):.3g} {unit} ({plot.choice})"
+        yield f"what is off the loop of {plot.choice}", float(said in layout["title"]["text"]), 1.0
+        low, high = layout["yaxis"]["range"]
+        yield f"the axis of the loop of {plot.choice}", [low, high], [1.5 * own.min(), 1.5 * own.max()]
 
 
 def _scene() -> Scene:
@@ -142,4 +155,5 @@ def _sides() -> Iterator[Said]:
 
 KINDS = {
     "playback": _playback, "loops of force": _loops, "friction figures": _friction, "loops": _sides,
+    "loops off scale": _far,
 }  # fmt: skip

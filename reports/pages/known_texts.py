@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reports.figures.styles import COLOURS
+from crossbody.reports.figures.styles import look
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid, index_page, precision, summary
 from crossbody.reports.pages.known_figures import drawn
 from crossbody.reports.pages.made_up_traces import Said, axis
 
 SEED, WHO, LABELS = 7, ("one:p", "two:q", "three:p"), ("first:a", "second:b", "third:c")
-PLACES = {"one:p": 2, "two:q": 6, "three:p": 4, "reference:compiled": 1}
 OFF = (3.7, -250.0, 9e4)
 """Multiples of its limit that each engine's error of velocity is off by from what is claimed of it."""
 NEAR = 1.2
@@ -50,7 +49,7 @@ class MadeUp:
         self.times = walls | {(label, summary.REFERENCE): float(self.base[c]) for c, label in enumerate(LABELS)}
         every = [one for rows in self.rows.values() for one in rows]
         found = SimpleNamespace(
-            rows=self.rows, verdicts=every, walls=self.times, places=PLACES, cases=LABELS,
+            rows=self.rows, verdicts=every, walls=self.times, engines=WHO, cases=LABELS,
             out=Path("/nonexistent"), told={},
         )  # fmt: skip
         self.results: Any = found
@@ -157,7 +156,7 @@ def _marks(figure: Any) -> dict[str, list[tuple[float, float]]]:
 def _precision() -> Iterator[Said]:
     """Yield marks at errors and run times in ms; limits; a run without an error, at the right edge."""
     made, walls = MadeUp(), dict(zip(WHO, MadeUp().walls[0].tolist(), strict=True))
-    (section,) = precision.precision(made.results.out, LABELS[0], made.rows[LABELS[0]], walls, PLACES)
+    (section,) = precision.precision(made.results.out, LABELS[0], made.rows[LABELS[0]], walls)
     figures = [(section, (0,)), *((one, tuple(range(3))) for one in precision.overview(made.results))]
     alone = SimpleNamespace(**{**vars(made.results), "rows": {LABELS[0]: made.rows[LABELS[0]]}})
     figures += [(one, (0,)) for one in precision.overview(alone)]  # type: ignore[arg-type]
@@ -171,14 +170,14 @@ def _precision() -> Iterator[Said]:
         yield (
             "colours",
             tuple((one["meta"], one["marker"]["color"]) for one in figure["data"]),
-            tuple((one["meta"], COLOURS[PLACES[one["meta"]]]) for one in figure["data"]),
+            tuple((one["meta"], look(one["meta"])["color"]) for one in figure["data"]),
         )
         if len(cases) == 1:
             shapes = [(s["x0"], s["x1"]) for s in figure["layout"]["shapes"]]
             yield "limit", shapes, [(made.limits[0], made.limits[0])]
-    (lost,) = precision.scatter([("one:p", math.inf, 3.0)], PLACES)["data"]
+    (lost,) = precision.scatter([("one:p", math.inf, 3.0)])["data"]
     yield "mark of a run without an error", lost["marker"]["symbol"], "x"
-    known, lost = precision.scatter([("one:p", 0.7, 2.0), ("two:q", math.inf, 3.0)], PLACES)["data"]
+    known, lost = precision.scatter([("one:p", 0.7, 2.0), ("two:q", math.inf, 3.0)])["data"]
     yield "the edge with a run without an error", lost["x"][0] > known["x"][0], 1.0
 
 

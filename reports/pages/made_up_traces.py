@@ -22,8 +22,6 @@ NAMES, UNITS, CONTACTS = ("x", "y", "z"), ("m", "cm", "rad"), ("a", "b", "on", "
 """Coordinates, each of a unit of its own; contacts: two that open, one that never does, one that carries nothing."""
 TURNING, ON, OFF = ("b",), 2, 3
 WHO = ("truth", "one:p", "two:q")
-PLACES = (0, 5, 3)
-"""Of the engines among all of a folder: not those among these motions."""
 
 
 class Drawn:
@@ -48,7 +46,7 @@ class Drawn:
         engine, _, profile = WHO[i].partition(":")
         starts = np.sort(self.draw.uniform(0.0, 1.0, 9))
         about = self.about | {
-            "engine": engine, "profile": profile, "place": PLACES[i],
+            "engine": engine, "profile": profile,
             "steps": (starts.tolist(), self.draw.uniform(0.02, 0.05, 9).tolist()),
         }  # fmt: skip
         run = self._run(i)
@@ -116,7 +114,7 @@ def lines(figure: Any, at: str) -> dict[str, tuple[Floats, Floats]]:
     """Return the finite points x, y of the line of each engine on a y axis."""
     found = {}
     for line in figure["data"]:
-        if line.get("yaxis", "y") == at:
+        if line.get("yaxis", "y") == at and line.get("mode") != "markers":
             x, y = numbers(line["x"]), numbers(line["y"])
             known = np.isfinite(x) & np.isfinite(y)
             found[line["meta"]] = x[known], y[known]

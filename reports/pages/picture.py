@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -13,7 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 from crossbody.cases import InvalidValue
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports import scenes
-from crossbody.reports.figures.styles import style
+from crossbody.reports.figures.styles import called, style
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.pages.figures import carrying
 from crossbody.reports.pages.filled import filled
@@ -22,7 +23,10 @@ from crossbody.reports.runs.store import Trace
 WIDTH, HEIGHT = 800, 500
 INK, PAPER, SOFT, PUSH = "#1a1d21", "#ffffff", "#4f5660", "#b3261e"
 TURN, TILT = 0.6, 0.35  # of the camera, rad: those with which a page begins
-ROUND = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 33)[:-1]) for f in (np.cos, np.sin)])
+ROUND = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 129)[:-1]) for f in (np.cos, np.sin)])
+"""Directions of a circle: so many that the outline of one that fills the picture is off by a tenth of a pixel."""
+EDGE, LINE, LETTERS, BAR = 14.0, 20.0, 14, 60.0
+"""Of what is written: distance from the border, between lines, height of letters, and least length of a bar, pixels."""
 FAR = 4.0  # times its own size that a mechanism goes before it is followed
 FORCE = 0.28  # part of the height that the largest force of a motion is as long as
 SUFFIXES = (".svg", ".png", ".gif")
@@ -30,18 +34,35 @@ SUFFIXES = (".svg", ".png", ".gif")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stroke:
-    """A line of points (n, 2), pixels; closed and filled with a colour, or open."""
+    """A line of points (n, 2), pixels; closed and filled with a colour, or open; with a radius a circle."""
 
     points: Floats
     color: str
     fill: str = ""
     width: float = 1.5
+    radius: float = 0.0
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Where the middle of a circle is, pixels."""
+        x, y = self.points.mean(axis=0).tolist()
+        return x, y
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Text:
+    """Words at the end of a bar, or at the border: where they begin, or end, pixels."""
+
+    text: str
+    x: float
+    y: float
+    ends: bool = False
 
 
 class Film:
-    """A motion that can be drawn at any instant; its place among those of its case decides its colour."""
+    """A motion that can be drawn at any instant, in the colour of its engine."""
 
-    def __init__(self, trace: Trace, i: int = 0) -> None:
+    def __init__(self, trace: Trace) -> None:
         name = str(trace.about.get("mechanism", ""))
         if name not in scenes.names() or not len(trace.run.t):
             raise InvalidValue(f"There is no picture of the mechanism {name or '(none is stored)'}.")
@@ -49,7 +70,8 @@ class Film:
         self.parameters = {**trace.about["parameters"], "scene": trace.about.get("scene")}
         self.stage = self.scene.stage(self.parameters)
         self.t, self.q = filled(trace.run, trace.quaternions)
-        self.color = style(trace, i)["color"]
+        self.color, self.who = style(trace)["color"], called(trace)
+        self.label = ":".join(filter(None, (trace.about.get("case", ""), trace.about.get("variant", ""))))
         self.lam = np.zeros_like(trace.run.lam)
         bearing = carrying([trace], idle(trace.run))
         self.lam[:, bearing] = np.nan_to_num(trace.run.lam[:, bearing])
@@ -74,9 +96,33 @@ class Film:
         pushes = self.scene.arrows(q[None], self.lam[row : row + 1], self.parameters)[0]
         return [*self._still(), *self._bodies(pose), *self._arrows(pushes)]
 
+    def legend(self, t: float) -> tuple[list[Stroke], list[Text]]:
+        """What tells whose motion it is and when, and the bars to measure lengths and forces by."""
+        whose = f"{self.label}, {self.who}"
+        key = Stroke(np.array([(EDGE, EDGE + 5.0), (EDGE + 22.0, EDGE + 5.0)]), self.color, width=4.0)
+        digits = max(0, 4 - int(np.floor(np.log10(self.t[-1] or 1.0))))
+        texts = [
+            Text(text=whose, x=EDGE + 30.0, y=EDGE + 10.0),
+            Text(text=f"t = {t:.{digits}f} s", x=WIDTH - EDGE, y=EDGE + 10.0, ends=True),
+        ]
+        bars, y = [key], HEIGHT - EDGE
+        for pixels, unit in self._measures():
+            value = _nice(BAR / pixels)
+            end = EDGE + value * pixels
+            bars.append(Stroke(np.array([(EDGE, y), (end, y)]), SOFT, width=2.0))
+            texts.append(Text(text=f"{value:g} {unit}", x=end + 8.0, y=y + 5.0))
+            y -= LINE
+        return bars, texts
+
+    def _measures(self) -> Iterator[tuple[float, str]]:
+        """Yield how many pixels a metre, and a newton of an arrow, has, if there are any."""
+        yield self.to.scale, "m"
+        if self.force:
+            yield FORCE * HEIGHT / self.force, "N"
+
     def _still(self) -> Iterator[Stroke]:
         for shape in self.stage.still:
-            yield Stroke(self.to(_outline(shape)), SOFT, width=1.2)
+            yield Stroke(self.to(_outline(shape)), SOFT, width=1.2, radius=self._radius(shape))
         for solid in self.stage.solids:
             if "plane" in solid:
                 origin, x, y = np.reshape(solid["plane"], (3, 3))
@@ -97,7 +143,11 @@ class Film:
                 for shape in shapes:
                     closed = "circle" in shape or shape["closed"]
                     points = self.to(_moved(_outline(shape), stand))
-                    yield Stroke(points, self.color, _pale(self.color) if closed else "")
+                    yield Stroke(points, self.color, _pale(self.color) if closed else "", radius=self._radius(shape))
+
+    def _radius(self, shape: scenes.Shape) -> float:
+        """Of a circle, pixels; 0 of what is none."""
+        return float(shape["circle"][2]) * self.to.scale if "circle" in shape else 0.0
 
     def _solids(self, pose: Floats) -> Iterator[Stroke]:
         """Outlines of the points that a sphere is swept over, those behind first."""
@@ -108,9 +158,12 @@ class Film:
                 flat = self.to(points)
                 ball = solid["radius"] * self.to.scale * ROUND
                 around = _hull((flat[:, None] + ball).reshape(-1, 2))
-                drawn.append((self.to.depth(points).mean(), around))
-        for _, around in sorted(drawn, key=lambda one: -one[0]):
-            yield Stroke(around, self.color, _pale(self.color))
+                radius = solid["radius"] * self.to.scale if len(points) == 1 else 0.0
+                drawn.append(
+                    (self.to.depth(points).mean(), Stroke(around, self.color, _pale(self.color), radius=radius))
+                )
+        for _, stroke in sorted(drawn, key=lambda one: -one[0]):
+            yield stroke
 
     def _arrows(self, pushes: Floats) -> Iterator[Stroke]:
         n = self.stage.dimensions
@@ -207,33 +260,61 @@ def _pale(color: str) -> str:
     return "#" + "".join(f"{round(255 - 0.25 * (255 - int(color[i : i + 2], 16))):02x}" for i in (1, 3, 5))
 
 
-def svg(strokes: Sequence[Stroke]) -> str:
+def _nice(value: float) -> float:
+    """Return the next of 1, 2, 5 times a power of ten."""
+    ten = 10.0 ** np.floor(np.log10(value) + 1e-9)
+    return float(next(ten * k for k in (1.0, 2.0, 5.0, 10.0) if ten * k >= 0.999 * value))
+
+
+def svg(strokes: Sequence[Stroke], texts: Sequence[Text] = ()) -> str:
     """An SVG of one instant."""
-    lines = []
-    for one in strokes:
-        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in one.points)
-        kind, fill = ("polygon", one.fill) if one.fill else ("polyline", "none")
-        lines.append(
-            f'<{kind} points="{points}" fill="{fill}" stroke="{one.color}" stroke-width="{one.width:g}" '
-            'stroke-linejoin="round" stroke-linecap="round"/>'
-        )
+    lines = [_tag(one) for one in strokes]
+    lines += [
+        f'<text x="{one.x:.2f}" y="{one.y:.2f}" text-anchor="{"end" if one.ends else "start"}" fill="{INK}" '
+        f'stroke="{PAPER}" stroke-width="4" paint-order="stroke" font-family="sans-serif" font-size="{LETTERS}">'
+        f"{escape(one.text)}</text>"
+        for one in texts
+    ]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">'
     return "\n".join([head, f'<rect width="100%" height="100%" fill="{PAPER}"/>', *lines, "</svg>", ""])
 
 
-def raster(strokes: Sequence[Stroke]) -> Any:
+def _tag(one: Stroke) -> str:
+    """A line, an area or a circle as SVG writes it."""
+    if one.radius:
+        x, y = one.centre
+        shape = f'circle cx="{x:.2f}" cy="{y:.2f}" r="{one.radius:.2f}"'
+    else:
+        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in one.points)
+        shape = f'{"polygon" if one.fill else "polyline"} points="{points}"'
+    return (
+        f'<{shape} fill="{one.fill or "none"}" stroke="{one.color}" stroke-width="{one.width:g}" '
+        'stroke-linejoin="round" stroke-linecap="round"/>'
+    )
+
+
+def raster(strokes: Sequence[Stroke], texts: Sequence[Text] = ()) -> Any:
     """An image of Pillow of one instant, drawn twice as large and made smaller, so that edges are smooth."""
     try:
-        from PIL import Image, ImageDraw
+        from PIL import Image, ImageDraw, ImageFont
     except ImportError:
         raise InvalidValue("PNG and GIF need Pillow (pip install pillow); SVG needs nothing.") from None
     image = Image.new("RGB", (2 * WIDTH, 2 * HEIGHT), PAPER)
     draw = ImageDraw.Draw(image)
     for one in strokes:
+        if one.radius:
+            (x, y), r = one.centre, one.radius
+            ends = [2.0 * end for end in (x - r, y - r, x + r, y + r)]
+            draw.ellipse(ends, fill=one.fill or None, outline=one.color, width=round(2 * one.width))
+            continue
         points = [(2.0 * float(x), 2.0 * float(y)) for x, y in one.points]
         if one.fill:
             draw.polygon(points, fill=one.fill)
         draw.line([*points, *points[:1]] if one.fill else points, one.color, round(2 * one.width), joint="curve")
+    font = ImageFont.load_default(2 * LETTERS)
+    for text in texts:
+        at, anchor = (2.0 * text.x, 2.0 * text.y), "rs" if text.ends else "ls"
+        draw.text(at, text.text, fill=INK, font=font, anchor=anchor, stroke_width=4, stroke_fill=PAPER)
     return image.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
 
 
@@ -248,9 +329,16 @@ def write(film: Film, path: Path, instant: float | None, fps: float, speed: floa
         raise InvalidValue(f"{t:g} s is outside the motion, which lasts from 0 to {end:g} s.")
     if path.suffix == ".gif":
         count = max(int(end / speed * fps), 1) + 1
-        first, *rest = (raster(film.at(float(one))) for one in np.linspace(0.0, end, count))
+        first, *rest = (raster(*_whole(film, float(one))) for one in np.linspace(0.0, end, count))
         first.save(path, save_all=True, append_images=rest, duration=round(1000.0 / fps), loop=0)
     elif path.suffix == ".png":
-        raster(film.at(t)).save(path)
+        raster(*_whole(film, t)).save(path)
     else:
-        path.write_text(svg(film.at(t)), encoding="utf-8")
+        path.write_text(svg(*_whole(film, t)), encoding="utf-8")
+
+
+def _whole(film: Film, t: float) -> tuple[list[Stroke], list[Text]]:
+    """What is drawn at an instant, s, and what tells how to read it."""
+    drawn = film.at(t)  # first: a camera that follows decides what a metre is
+    strokes, texts = film.legend(t)
+    return [*drawn, *strokes], texts

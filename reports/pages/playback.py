@@ -16,6 +16,7 @@ from crossbody.reports.figures.section import Section
 from crossbody.reports.figures.styles import coded, label, style
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
+from crossbody.reports.pages.errors import told
 from crossbody.reports.pages.figures import carrying
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace
@@ -42,8 +43,8 @@ def playback(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     if not name:  # a log that was replayed has none
         return []
     if name not in scenes.names():
-        told = f"There is no picture of the mechanism {name}."
-        return [Section(name="playback", title="Playback", text=told)]
+        why = f"There is no picture of the mechanism {name}."
+        return [Section(name="playback", title="Playback", text=why)]
     try:
         scene = packed(traces, scenes.load(name), share)
     except (KeyError, ValueError, IndexError, CrossbodyError) as error:
@@ -51,7 +52,7 @@ def playback(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
     caption = f"Motion of {about['case']}, {about['variant']}, as {', '.join(map(label, traces))} computed it."
     return [
         Section(
-            name="playback", title="Playback", text=TEXT, template="playback.html",
+            name="playback", title="Playback", text=f"{TEXT} {told(traces)}".strip(), template="playback.html",
             context={"scene": scene, "caption": caption,
                      "frames": scene["stage"]["frames"], "events": bool(scene["events"]),
                      "compared": len(scene["tracks"]) > 1 and any(track["truth"] for track in scene["tracks"])},
@@ -68,7 +69,7 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene, share: float = 1.0) -> 
     pushing = _pushing(traces, scene, parameters, bearing)
     width = 1 + scene.poses(traces[0].run.q[:1], parameters)[0].size + 2 * stage.dimensions * int(pushing.sum())
     frames = int(np.clip(share * ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
-    drawn = [_track(trace, i, scene, parameters, frames, pushing) for i, trace in enumerate(traces) if len(trace.run.t)]
+    drawn = [_track(trace, scene, parameters, frames, pushing) for trace in traces if len(trace.run.t)]
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
         "end": max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0),
@@ -99,14 +100,14 @@ def events(run: Trajectory) -> list[float]:
 
 
 def _track(
-    trace: Trace, i: int, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int, pushing: NDArray[np.bool_]
+    trace: Trace, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int, pushing: NDArray[np.bool_]
 ) -> dict[str, Any]:  # fmt: skip
     run = trace.run
     t, q = filled(run, trace.quaternions)
     at = chosen(t, np.array([e.t for e in run.events]), frames)
     lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t[at], side="right"), 1))
     poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)[:, pushing]
-    look = style(trace, i)
+    look = style(trace)
     return {
         "name": label(trace), "color": look["color"], "strokes": look["strokes"],
         "truth": label(trace) == TRUTH, "t": _single(t[at]), "poses": _single(poses),

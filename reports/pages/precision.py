@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports.figures.section import Figure, Plot, Section
-from crossbody.reports.figures.styles import COLOURS, LINE, plain
+from crossbody.reports.figures.styles import LINE, look, place_of, plain
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
@@ -30,9 +30,7 @@ LADDERS = (
 )
 
 
-def precision(
-    out: Path, label: str, rows: Sequence[Row], walls: Mapping[str, float], places: Mapping[str, int]
-) -> list[Section]:
+def precision(out: Path, label: str, rows: Sequence[Row], walls: Mapping[str, float]) -> list[Section]:
     """The section, if there is anything to show: a benchmark in the folder, or verdicts and run times, s."""
     if ladders := _ladders(out, label):
         import pandas as pd
@@ -44,7 +42,7 @@ def precision(
         (row["who"], float(row["value"]), 1e3 * walls[row["who"]]) for row in rows
         if row["metric"] == "position" and row["value"] is not None and walls.get(row["who"])
     ]  # fmt: skip
-    return [_section(scatter(points, places, _limits(rows)), RUNS)] if points else []
+    return [_section(scatter(points, _limits(rows)), RUNS)] if points else []
 
 
 def overview(found: Results) -> list[Section]:
@@ -59,11 +57,11 @@ def overview(found: Results) -> list[Section]:
         return []
     if len(found.rows) == 1:
         marks = [(who, error, ms) for who, ((_, error, ms),) in points.items()]
-        return [_section(scatter(marks, found.places, _limits(next(iter(found.rows.values())))), RUNS)]
-    return [_section(cloud(points, found.places), ALL)]
+        return [_section(scatter(marks, _limits(next(iter(found.rows.values())))), RUNS)]
+    return [_section(cloud(points), ALL)]
 
 
-def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapping[str, int]) -> Figure:
+def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
     """One mark a case, a colour and a symbol an engine: error of position (relative), run time in ms.
 
     Marks of an engine are in the order of their errors: the page writes its name beside the last.
@@ -74,9 +72,9 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]], places: Mapp
             "y": [ms for *_, ms in mine], "name": plain(who), "meta": who,
             "text": [plain(label) for label, *_ in mine],
             "hovertemplate": "%{text}<br>error %{x:.2g}, %{y:.3g} ms<extra>" + plain(who) + "</extra>",
-            "marker": _mark(places[who]) | {"size": 9, "opacity": 0.8},
+            "marker": _mark(who) | {"size": 9, "opacity": 0.8},
         }
-        for who, given in sorted(points.items(), key=lambda one: places[one[0]])
+        for who, given in sorted(points.items(), key=lambda one: place_of(one[0]))
         for mine in (sorted(given, key=lambda one: one[1]),)
     ]  # fmt: skip
     every = [one for mine in points.values() for one in mine]
@@ -100,8 +98,8 @@ def _ladders(out: Path, label: str) -> list[dict[str, Any]]:
     return [row for row in read_json(out / "bench.json")["rows"] if row["case"] == label]
 
 
-def _mark(place: int) -> dict[str, str]:
-    return {"color": COLOURS[place % len(COLOURS)], "symbol": SYMBOLS[place % len(SYMBOLS)]}
+def _mark(who: str) -> dict[str, str]:
+    return {"color": look(who)["color"], "symbol": SYMBOLS[place_of(who) % len(SYMBOLS)]}
 
 
 def _limits(rows: Sequence[Row]) -> list[float]:
@@ -109,9 +107,7 @@ def _limits(rows: Sequence[Row]) -> list[float]:
     return sorted({row["limit"] for row in rows if row["metric"] == "position" and (row["limit"] or 0.0) > 0.0})
 
 
-def scatter(
-    points: Sequence[tuple[str, float, float]], places: Mapping[str, int], limits: Sequence[float] = ()
-) -> Figure:  # fmt: skip
+def scatter(points: Sequence[tuple[str, float, float]], limits: Sequence[float] = ()) -> Figure:
     """One mark an engine: error of position (relative), run time in ms; its limits are dashed."""
     finite = [error for _, error, _ in points if math.isfinite(error)]
     edge = 10.0 * max([*finite, FLOOR])
@@ -120,7 +116,7 @@ def scatter(
             "type": "scatter", "mode": "markers",
             "x": [max(error, FLOOR) if math.isfinite(error) else edge], "y": [ms],
             "name": plain(who), "meta": who, "cliponaxis": False,
-            "marker": _mark(places[who]) | {"size": 10} | ({} if math.isfinite(error) else {"symbol": "x"}),
+            "marker": _mark(who) | {"size": 10} | ({} if math.isfinite(error) else {"symbol": "x"}),
         }
         for who, error, ms in points
     ]  # fmt: skip

@@ -34,6 +34,7 @@ _CELL = re.compile(r"<t[dh]\b([^>]*)>(.*?)</t[dh]>", re.DOTALL)
 _TILE = re.compile(r'<li class="[^"]*"><strong>(\d+)</strong> ([^<]*)</li>')
 _DATA = re.compile(r'data-(v|name|engine)="([^"]*)"')
 _TAGS = re.compile(r"<[^>]*>")
+_PLACE = re.compile(r" \(([^()]* by [^()]* at [^()]*)\)$")
 _NUMBER = re.compile(r"(?:< )?(-?(?:\d[\d.]*(?:e[+-]\d+)?|inf))$")
 
 
@@ -207,14 +208,17 @@ def _of_worst(said: str, label: str, runs: Mapping[Run, Sequence[Row]]) -> Itera
     """Yield whether the number beside a case is none of its worst word."""
     if not said:
         return
-    who, _, rest = said.rpartition(": ")
+    found = _PLACE.search(said)
+    place = found[1] if found else ""
+    who, _, rest = said.removesuffix(f" ({place})").rpartition(": ")
     metric, _, number = rest.rpartition(" ")
     mine = [row for (one, _), rows in runs.items() if one == label for row in rows]
     ranks = (*WORDS[:3], "not judged", "within")
     least = min(ranks.index(row["verdict"]) for row in mine if _is_told(row))
     for row in mine:
         named = f"{row['engine']}:{row['profile']}".removesuffix(":") == who and row["metric"] == metric
-        if named and ranks.index(row["verdict"]) == least and _says(number, row["value"] + 0.0, 2):
+        right = not place or row.get("where") == place
+        if named and right and ranks.index(row["verdict"]) == least and _says(number, row["value"] + 0.0, 2):
             return
     yield f"{said!r} is not the worst of {label}"
 

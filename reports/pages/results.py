@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,8 @@ from crossbody.reports.runs.output import is_staged, recover
 from crossbody.reports.runs.store import Trace, load, peek
 from crossbody.reports.runs.study import check_fields, read_json
 
+NAMED = 3
+"""Cases in which nothing moves that are named."""
 NUMBER = (int, float, type(None))
 JUDGED = {name: NUMBER if kind is float else (str,) for name, kind in COLUMNS.items()}
 AUDITED = dict.fromkeys(("case", "engine", "profile", "quantity"), (str,))
@@ -35,7 +37,6 @@ class CaseFiles:
         about: what is known of it; of the truth, where there is one.
         paths: files of its motions, truth first.
         missing: sentences on motions that should be there and cannot be read.
-        places: of the engines of all cases, from 1 on: they decide how an engine looks.
     """
 
     label: str
@@ -43,17 +44,10 @@ class CaseFiles:
     about: Mapping[str, Any]
     paths: tuple[Path, ...]
     missing: tuple[str, ...]
-    places: Mapping[str, int]
 
     def traces(self) -> list[Trace]:
         """The motions themselves."""
-        return [self._placed(load(path)) for path in self.paths]
-
-    def _placed(self, trace: Trace) -> Trace:
-        from crossbody.reports.figures.styles import label
-
-        place = self.places.get(label(trace))
-        return trace if place is None else replace(trace, about={**trace.about, "place": place})
+        return [load(path) for path in self.paths]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +61,7 @@ class Results:
         told: provenance.
         cases: in the order of their verdicts.
         walls: (case:variant, engine:profile) -> run time, s.
-        places: of the engines, from 1 on: they decide how an engine looks.
+        engines: those that ran on some case, profiles of one side by side.
     """
 
     out: Path
@@ -77,7 +71,7 @@ class Results:
     told: Mapping[str, Any]
     cases: tuple[CaseFiles, ...]
     walls: Mapping[tuple[str, str], float]
-    places: Mapping[str, int]
+    engines: Sequence[str]
     base: Sequence[Row] | None = None
     base_name: str = ""
 
@@ -97,12 +91,11 @@ def read(out: Path, against: Path | None = None) -> Results:
     audited = read_json(out / "audit.json")["rows"]
     check_fields(out / "audit.json", audited, AUDITED)
     audits = by(audited, "case")
-    places = places_of(verdicts)
-    cases, times = _cases(out, verdicts, places)
+    cases, times = _cases(out, verdicts)
     base = None if against is None else verdicts_of(against)
     return Results(
         out=out, verdicts=verdicts, rows=by(verdicts, "label"), audits=audits, told=told,
-        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, places=places, base=base,
+        cases=cases, walls={one: wall for one, (wall, _) in times.items()}, engines=engines_of(verdicts), base=base,
         base_name="" if against is None else str(against),
     )  # fmt: skip
 
@@ -126,16 +119,15 @@ def verdicts_of(out: Path) -> list[Row]:
     ]
 
 
-def places_of(verdicts: Sequence[Row]) -> dict[str, int]:
+def engines_of(verdicts: Sequence[Row]) -> list[str]:
     """Engines that ran on some case, in the order of their rows, profiles of one engine side by side."""
     from crossbody.reports.pages.grid import names
 
     ran = {row["who"] for row in verdicts if row["verdict"] != Word.SKIPPED}
-    found = [who for who in names(row for row in verdicts if row["engine"] != TRUTH) if who in ran]
-    return {who: i for i, who in enumerate(found, start=1)}
+    return [who for who in names(row for row in verdicts if row["engine"] != TRUTH) if who in ran]
 
 
-def _cases(out: Path, verdicts: Sequence[Row], places: Mapping[str, int]) -> tuple[tuple[CaseFiles, ...], Times]:
+def _cases(out: Path, verdicts: Sequence[Row]) -> tuple[tuple[CaseFiles, ...], Times]:
     """Every case that has a verdict or a motion, and the run times with what each engine took in all."""
     paths: dict[str, list[Path]] = {}
     abouts: dict[str, Mapping[str, Any]] = {}
@@ -161,15 +153,23 @@ def _cases(out: Path, verdicts: Sequence[Row], places: Mapping[str, int]) -> tup
         CaseFiles(
             label=label, page=f"case-{file_name(label)}", about=abouts.get(label, {}),
             paths=tuple(paths.get(label, ())),
-            missing=_missing(label, wanted.get(label, []), times, broken), places=places,
+            missing=_missing(label, wanted.get(label, []), times, broken),
         ) for label in labels
     )  # fmt: skip
     return found, times
 
 
-def times_of(out: Path) -> Times:
-    """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile."""
-    return _cases(out, verdicts_of(out), {})[1]
+def times_of(out: Path) -> tuple[Times, str]:
+    """Run times of a folder, and what each engine took in all, s, by case:variant and engine:profile; what rests."""
+    cases, times = _cases(out, verdicts_of(out))
+    return times, at_rest(cases)
+
+
+def at_rest(cases: Sequence[CaseFiles]) -> str:
+    """Say in which cases nothing moves, so that verdicts on them say little of motions; nothing if there are none."""
+    still = [case.label for case in cases if case.about.get("still")]
+    named = ", ".join(still[:NAMED]) + (f" and {len(still) - NAMED} more" if len(still) > NAMED else "")
+    return f"Nothing moves in {named}: the truth stays where it starts." if still else ""
 
 
 def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:
@@ -188,12 +188,12 @@ def check(against: Path | None, others: Sequence[Path]) -> None:
         beside.tables(other)
 
 
-def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
-    """One motion of a folder, "truth" or of an engine:profile, and its place among those of its case."""
+def motion(out: Path, case: str, engine: str) -> Trace:
+    """One motion of a folder, "truth" or of an engine:profile."""
     from crossbody.reports.figures.styles import label
 
     verdicts = verdicts_of(out)
-    found = _cases(out, verdicts, places_of(verdicts))[0]
+    found = _cases(out, verdicts)[0]
     drawable = [one for one in found if one.paths and case in ("", one.label)]
     listed = _listed(one.label for one in found)
     if not drawable:
@@ -206,7 +206,7 @@ def motion(out: Path, case: str, engine: str) -> tuple[Trace, int]:
     place = next((i for i, name in enumerate(names) if engine in (name, name.partition(":")[0])), None)
     if place is None:
         raise InvalidValue(f"{out} has no motion of {engine} on {mine.label}; it has {_listed(names)}.")
-    return traces[place], place
+    return traces[place]
 
 
 def _listed(names: Iterable[str]) -> str:

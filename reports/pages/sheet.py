@@ -26,6 +26,8 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 group, between groups (with times), pixels."""
 NAME = 12  # height of the name of a line beside its plot, pixels
 SEEN = 6  # height of a band that is seen around the truth, pixels
+NARROW = 4  # limits around the truth that are said, where they are narrower than its line
+LONG = 0.02  # part of the horizon: a line of errors is broken where a run has no sample for longer
 LEAP = 100.0  # times a floor: a line that goes from there farther within one sample is broken
 DIGITS = 12  # of the mantissa of a value on a logarithmic axis, bits: four decimal ones
 MODE_COLOURS = {
@@ -55,6 +57,7 @@ class Sheet:
         self.far: dict[str, list[tuple[float, str, str]]] = {}
         self.limits: list[tuple[int, float, str]] = []
         self.bands: list[tuple[int, float, str]] = []
+        self.sparse, self.end = False, 0.0
 
     def limit(self, row: int, value: float, name: str) -> None:
         """Draw what a plot's lines may reach and be within."""
@@ -77,17 +80,25 @@ class Sheet:
         self.far.setdefault(who, []).append((size, unit, where))
 
     def line(
-        self, trace: Trace, i: int, row: int, y: Floats, t: Floats | None = None, floor: float = 0.0, **more: Any
+        self, trace: Trace, row: int, y: Floats, t: Floats | None = None, floor: float = 0.0, **more: Any
     ) -> None:  # fmt: skip
-        """One line of one engine into plot `row`, thinned; what is not finite, or leaps from a floor, is a gap."""
+        """One line of one engine into plot `row`, thinned; what is not finite, or leaps from a floor, is a gap.
+
+        One with a floor is of errors: what they are within a long step nobody knows, so its ends alone are drawn.
+        """
         t = trace.run.t if t is None else t
         if not len(t) or not np.isfinite(y).any():
             return
+        self.end = max(self.end, float(t[-1]))
         most = int(np.clip(SHARE * self.points / AROUND, 3, EVENTS))
         events = distinct([e.t for e in trace.run.events])[:most]
         at = keep(t, y, events, self.points - AROUND * len(events))
-        drawn_t, drawn_y = broken(t[at], y[at], floor) if floor else (t[at], y[at])
-        look = style(trace, i)
+        drawn_t, drawn_y, look = t[at], y[at], style(trace)
+        if floor:
+            long = np.flatnonzero(np.diff(t) > LONG * (t[-1] - t[0]))
+            at = distinct(at, long, long + 1)
+            drawn_t, drawn_y = broken(t[at], y[at], floor, np.flatnonzero(np.isin(at[:-1], long)) + 1)
+            self._dots(trace, row, t, y, distinct(long, long + 1), look["color"])
         line = {
             "type": "scatter", "x": coded(_times(drawn_t)),
             "name": plain(called(trace)), "meta": label(trace), "mode": "lines",
@@ -97,11 +108,23 @@ class Sheet:
         with np.errstate(over="ignore"):  # what is larger than any plot shows is a gap
             self.lines.append((row, drawn_y.astype(np.float32), line))
 
+    def _dots(
+        self, trace: Trace, row: int, t: Floats, y: Floats, at: NDArray[np.intp], color: str
+    ) -> None:  # fmt: skip
+        """Samples at the ends of long steps; they have no name, which stands at the end of the line."""
+        if not np.isfinite(y[at]).any():
+            return
+        self.sparse = True
+        dots = {"type": "scatter", "x": coded(_times(t[at])), "name": "", "meta": label(trace), "mode": "markers",
+                "marker": {"size": 4, "color": color}, "cliponaxis": False}  # fmt: skip
+        with np.errstate(over="ignore"):
+            self.lines.append((row, y[at].astype(np.float32), dots))
+
     def done(self) -> dict[str, Any]:
         """The figure."""
         drawn = sorted({row for row, *_ in self.lines})
         axes, height = self._axes(drawn)
-        bands = self._seen()
+        bands, narrow = self._seen()
         place = {row: number(i + 1) for i, row in enumerate(drawn)}
         data = [
             line
@@ -110,32 +133,44 @@ class Sheet:
             | ({"band": [half for half, _ in bands[row]]} if row in bands and line["meta"] == TRUTH else {})
             for row, y, line in self.lines
         ]
-        layout = {"title": {"text": self._caption(drawn, bands)}, "height": height, "showlegend": False} | axes
+        layout = {"title": {"text": self._caption(drawn, bands, narrow)}, "height": height, "showlegend": False} | axes
         limits = [(f"y{place[row]}", value, name) for row, value, name in self.limits if row in place]
         return {"data": data, "layout": layout | {"shapes": [level(*one) for one in limits]}}
 
-    def _seen(self) -> dict[int, list[tuple[float, str]]]:
-        """Half widths and names of the bands that are wider than the line that they are around."""
+    def _seen(self) -> tuple[dict[int, list[tuple[float, str]]], list[str]]:
+        """Half widths and names of the bands that are wider than the line that they are around, and what others are."""
         found: dict[int, list[tuple[float, str]]] = {}
+        narrow: dict[int, dict[str, None]] = {}
         for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
             seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
             if 2.0 * half * PLOT > SEEN * np.ptp(seen):
                 found.setdefault(row, []).append((half, name))
-        return found
+            else:
+                unit = self.rows[row].partition("\n")[2].strip("[]")
+                narrow.setdefault(row, {})[f"±{half:.2g} {unit} ({name})"] = None
+        alike: dict[str, dict[str, None]] = {}
+        for row, texts in narrow.items():
+            alike.setdefault(", ".join(texts), {})[self.rows[row].partition("\n")[0]] = None
+        return found, [f"{', '.join(titles)} {text}" for text, titles in alike.items()]
 
-    def _caption(self, drawn: Sequence[int], bands: Mapping[int, Sequence[tuple[float, str]]]) -> str:
+    def _caption(
+        self, drawn: Sequence[int], bands: Mapping[int, Sequence[tuple[float, str]]], narrow: Sequence[str]
+    ) -> str:  # fmt: skip
         empty = [name.partition("\n")[0] for row, name in enumerate(self.rows) if row not in drawn]
         told = [f"Empty and left out: {', '.join(empty)}"] if empty else []
         told += [f"Off scale: {off_scale(self.far)}"] if self.far else []
         names = dict.fromkeys(name for each in bands.values() for _, name in each)
         told += [f"Grey around the truth: {', '.join(names)}"] if names else []
+        more = f"; and {len(narrow) - NARROW} more" if len(narrow) > NARROW else ""
+        told += [f"Limits narrower than a line: {'; '.join(narrow[:NARROW])}{more}"] if narrow else []
+        told += ["Dots: the ends of long steps, between which no error is known"] if self.sparse else []
         return ". ".join([self.title, *told])
 
     def _axes(self, drawn: Sequence[int]) -> tuple[dict[str, Any], int]:
         """Axes of the plots that are drawn, and the height of the figure, pixels."""
         last = [i + 1 == len(drawn) or row // self.group != drawn[i + 1] // self.group for i, row in enumerate(drawn)]
         below = [APART if end else CLOSE for end in last[:-1]] + [0]
-        names = Counter(row for row, *_ in self.lines)
+        names = Counter(row for row, _, line in self.lines if line["name"])
         heights = [max(TALL if row in self.decades else PLOT, NAME * names[row]) for row in drawn]
         inside = sum(heights) + sum(below)
         axes: dict[str, Any] = {}
@@ -143,6 +178,8 @@ class Sheet:
         for i, row in enumerate(drawn):
             span = [1.0 - (top + heights[i]) / inside, 1.0 - top / inside]
             axes |= _pair(number(i + 1), self.rows[row], [max(span[0], 0.0), span[1]], last[i])
+            if self.sparse and not i:  # dots would widen it
+                axes["xaxis"]["range"] = [0.0, self.end]
             if i + 1 == len(drawn):
                 axes[f"xaxis{number(i + 1)}"]["title"] = {"text": "time [s]"}
             if row in self.ranges:
@@ -154,8 +191,10 @@ class Sheet:
         return axes, TOP + inside + BOTTOM
 
 
-def broken(t: Floats, y: Floats, floor: float) -> tuple[Floats, Floats]:
+def broken(t: Floats, y: Floats, floor: float, more: Sequence[int] | NDArray[np.intp] = ()) -> tuple[Floats, Floats]:
     """Break a line on a logarithmic axis where it leaps from the floor, or back to it: nothing is known in between.
+
+    So it is before more of its points, each the end of a long step.
 
     A value that is alone stays joined to its neighbours, or nobody would see it, but for a first or last one at the
     floor, such as the difference at the start.
@@ -165,7 +204,7 @@ def broken(t: Floats, y: Floats, floor: float) -> tuple[Floats, Floats]:
     several = np.diff(np.concatenate([[0], starts, [len(y)]])) > 1
     several[[0, -1]] |= low[[0, -1]]
     leaps = np.maximum(y[starts], y[starts - 1]) > LEAP * floor
-    at = starts[several[:-1] & several[1:] & leaps]
+    at = distinct(starts[several[:-1] & several[1:] & leaps], np.asarray(more, dtype=np.intp))
     return np.insert(t, at, t[at]), np.insert(y, at, np.nan)
 
 
@@ -227,7 +266,7 @@ def modes(traces: Sequence[Trace], points: int = LONGEST, limits: object = None,
         "height": 150 + 18 * len({bar["y"][0] for bar in bars}),
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom"},
         "xaxis": {"title": {"text": "time [s]"}, "range": [0.0, float(traces[0].run.t[-1])]},
-        "yaxis": {"automargin": True, "tickfont": {"size": 10}},
+        "yaxis": {"automargin": True, "tickfont": {"size": 10}, "dtick": 1},  # every strip has its name
     }  # fmt: skip
     return {"data": bars, "layout": layout}
 

@@ -18,7 +18,7 @@ from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
 from crossbody.reports.pages.results import Results, read
-from crossbody.reports.runs import beside, output
+from crossbody.reports.runs import beside, manifest, output
 from crossbody.reports.runs.manifest import INDEX, PAGE
 from crossbody.reports.runs.study import read_json
 
@@ -46,6 +46,11 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
     with output.folder(out, "report", adds=True) as made:
         _make(made, single_file, against, others)
     return out / PAGE
+
+
+def pages_of(out: Path) -> set[str]:
+    """Names of the pages of a folder that crossbody wrote."""
+    return {name for name in manifest.read(out).files if name.endswith(".html")}
 
 
 def _make(made: Path, single_file: bool, against: Path | None, others: Sequence[Path]) -> None:

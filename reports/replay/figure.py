@@ -10,7 +10,7 @@ import pandas as pd
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES, coded, level, number, plain
+from crossbody.reports.figures.styles import COLOURS, coded, level, look, number, plain
 
 GREY = "#888888"
 SIGNED = [[0.0, COLOURS[0]], [0.5, "#f4f4f4"], [1.0, COLOURS[3]]]
@@ -32,7 +32,7 @@ def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()
             if i == 1:
                 data += [*_band(t, seen - left, noise.get(channel, np.nan), place), _line(t, seen, "measured", place)]
                 data[-1]["line"] = {"color": GREY, "width": 4}
-            data.append(_line(t, seen - left, str(who), place, i))
+            data.append(_line(t, seen - left, str(who), place, engine=True))
     return _figure("Measured and predicted", data, [f"{name}\n[{unit}]" for name, unit in channels], "time [s]",
                    _shades(rows, held, len(channels)))  # fmt: skip
 
@@ -47,9 +47,9 @@ def residual(
     channels = _channels(rows)
     data, shapes = [], list(_shades(rows, held, len(channels)))
     for place, (channel, _) in enumerate(channels, start=1):
-        for i, (who, line) in enumerate(rows[rows["channel"] == channel].groupby("who", sort=False), start=1):
+        for who, line in rows[rows["channel"] == channel].groupby("who", sort=False):
             t, _, left = _broken(line)
-            data.append(_line(t, left, str(who), place, i))
+            data.append(_line(t, left, str(who), place, engine=True))
         half = SIGMAS * noise.get(channel, np.nan)
         shapes += [_rectangle(place, y=(-half, half))] if np.isfinite(half) else []
         shapes += [level(f"y{number(place)}", side * limits[channel], "limit") for side in (-1, 1) if channel in limits]
@@ -64,9 +64,11 @@ def correlation(rows: pd.DataFrame) -> Figure:
     data, shapes = [], []
     for place, (channel, given) in enumerate(kinds, start=1):
         chosen = rows[(rows["channel"] == channel) & (rows["input"] == given)]
-        for i, (who, line) in enumerate(chosen.groupby("who", sort=False), start=1):
+        for who, line in chosen.groupby("who", sort=False):
             lag, value = line["lag"].to_numpy(float), line["value"].to_numpy(float)
-            data.append(_line(lag, value, str(who), place, i) | {"mode": "lines+markers", "marker": {"size": 4}})
+            data.append(
+                _line(lag, value, str(who), place, engine=True) | {"mode": "lines+markers", "marker": {"size": 4}}
+            )
         band = float(chosen["band"].iloc[0])
         shapes.append(_rectangle(place, y=(-band, band)))
     names = [f"{channel} with\n{given or 'itself'}" for channel, given in kinds]
@@ -131,15 +133,15 @@ def _broken(line: pd.DataFrame) -> tuple[Floats, Floats, Floats]:
     return t, seen, left
 
 
-def _line(x: Floats, y: Floats, name: str, place: int, i: int = 0) -> dict[str, Any]:
+def _line(x: Floats, y: Floats, name: str, place: int, engine: bool = False) -> dict[str, Any]:
     """One line; its name stands in the legend once."""
-    look = {"color": COLOURS[i % len(COLOURS)], "dash": DASHES[max(i - 1, 0) % len(DASHES)], "width": 1.5}
+    drawn = ({key: look(name)[key] for key in ("color", "dash")} if engine else {"color": COLOURS[0]}) | {"width": 1.5}
     axis = number(place)
     return {
         "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)),
-        "name": plain(name), "legendgroup": plain(name), "showlegend": place == 1, "line": look,
+        "name": plain(name), "legendgroup": plain(name), "showlegend": place == 1, "line": drawn,
         "xaxis": f"x{axis}", "yaxis": f"y{axis}",
-    } | ({"meta": name} if i else {})  # fmt: skip
+    } | ({"meta": name} if engine else {})  # fmt: skip
 
 
 def _band(t: Floats, y: Floats, noise: float, place: int) -> Iterator[dict[str, Any]]:

@@ -22,6 +22,7 @@ from crossbody.reports.judging.comparison import judged, unlike_stored
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.scale import still
 from crossbody.reports.measuring.truth import TRUTH, Truth
 from crossbody.reports.metrics.position import gap_scale_of, scale_of
 from crossbody.reports.runs import files, read_back, watch
@@ -191,7 +192,7 @@ def traces(result: CaseResult) -> list[Trace]:
     case, truth = result.case, result.truth
     about = _about(case, TRUTH, "") | {"tier": truth.tier.value, "source": truth.source}
     about["scales"] = scale_of(truth.trajectory, case).tolist()
-    about["gap_scales"] = _gap_scales(truth, case)
+    about["gap_scales"], about["still"] = _gap_scales(truth, case), still(truth.trajectory)
     found = [Trace(about=about, run=truth.trajectory)]
     return found + [_trace(case, entry, truth) for entry in result.entries if entry.run is not None]
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
 from crossbody.reports.figures.section import Column, Kind, Plot, Section, Table, columns, records
+from crossbody.reports.layout import unit_text
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Identification"
@@ -52,7 +52,9 @@ def sections(out: Path) -> tuple[Section, ...]:
     estimates["half"] = (estimates["high"] - estimates["low"]) / 2.0
     held["means"], held["unit"] = held["error"].map(MEANS), _unit(out)
     told = read_json(out / "identify.json")["provenance"]["fit"]
-    text = _told(estimates, held, told)
+    windows = [len(told[name]) for name in ("fitted", "held")]
+    how = f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."
+    text = " ".join([summary(estimates, held, *windows), *told["warnings"], how, OF_FIT])
     estimates["identifiable"] = estimates["identifiable"].map({True: "yes", False: "no"})
     tables = (
         Table(title="Estimates", columns=ESTIMATES, rows=records(_only(estimates, ESTIMATES)), file="identify.csv"),
@@ -85,15 +87,27 @@ def _only(rows: pd.DataFrame, shown: Sequence[Column]) -> pd.DataFrame:
     return rows.reindex(columns=[column.key for column in shown])
 
 
-def _told(estimates: pd.DataFrame, held: pd.DataFrame, told: Mapping[str, Any]) -> str:
-    """What is identified and whether it holds on other windows first, then how that is known."""
-    lost = [str(row["name"]) for row in records(estimates) if not row["identifiable"]]
-    text = f"{len(estimates) - len(lost)} of {len(estimates)} parameters are identified" + (
-        f"; not {', '.join(lost)}." if lost else "."
-    )
+def summary(estimates: pd.DataFrame, held: pd.DataFrame, fitted: int, left: int) -> str:
+    """Say what is identified, and whether it holds on windows that were left out of the fit.
+
+    Args:
+        estimates: with name, value, low, high, unit and identifiable of each parameter.
+        held: with error, held_before and held_after, and verdict where it is judged.
+        fitted: how many windows were fitted.
+        left: how many were left out.
+    """
+    rows = records(estimates)
+    known, lost = ([row for row in rows if bool(row["identifiable"]) == right] for right in (True, False))
+    values = [
+        f"{row['name']} = {row['value']:.5g} ± {(row['high'] - row['low']) / 2.0:.1g}{unit_text(str(row['unit']))}"
+        for row in known
+    ]
+    text = f"{len(known)} of {len(rows)} parameters are identified{': ' * bool(values)}{', '.join(values)}"
+    text += f"; not {', '.join(str(row['name']) for row in lost)}." if lost else "."
+    if not left:
+        return f"{text} No window of {fitted} was left out of the fit: nothing shows whether it holds on others."
     rmse = next((row for row in records(held) if row["error"] == "rmse"), None)
     if rmse is not None and rmse["held_before"] is not None and rmse["held_after"] is not None:
         text += f" On held-out windows the rmse changed from {rmse['held_before']:.4g} to "
         text += f"{rmse['held_after']:.4g} ({rmse.get('verdict') or 'not judged'})."
-    how = f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."
-    return " ".join([text, *told["warnings"], how, OF_FIT])
+    return text

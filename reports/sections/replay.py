@@ -24,6 +24,8 @@ METRICS = columns(
     who="Engine", metric="Metric", means=("Meaning", Kind.LONG), channel="Channel",
     value=("Value", Kind.NUMBER), unit="Unit", valid="Valid", verdict=("Verdict", Kind.VERDICT),
 )  # fmt: skip
+JUDGED = ("outside", "crashed", "within")
+"""Words of verdicts, the worst first."""
 MEANS = {
     "fit": "share of the measured motion that is explained, 100 at best",
     "rmse": "root mean square of measured minus predicted",
@@ -82,9 +84,8 @@ def sections(out: Path) -> tuple[Section, ...]:
     if not held:  # windows held out of a fit are judged with it, and where nothing is judged the page begins so
         said = "" if metrics["limit"].isna().all() else f"{judged(metrics)} "
         text = f"{said}{explained(metrics)} {text}"
-    table = Table(title="Metrics of the replay", columns=METRICS, rows=records(metrics), file="replay.csv", once=True)
     shown = [
-        Section(name="replay", title="Log and model", text=text, tables=(table,)),
+        Section(name="replay", title="Log and model", text=text, tables=tables(metrics)),
         Section(name="replay-plots", title="Measured and predicted", text=TEXT, plots=plots),
     ]
     if len(found):
@@ -93,6 +94,20 @@ def sections(out: Path) -> tuple[Section, ...]:
         )
         shown.append(Section(name="replay-log", title="Checks of the log", tables=(table,)))
     return tuple(shown)
+
+
+def tables(metrics: pd.DataFrame) -> tuple[Table, ...]:
+    """Return the numbers that are judged, the worst first, and folded all others."""
+    words = metrics["verdict"].map(str)
+    rank = words.map({word: k for k, word in enumerate(JUDGED)})
+    known, rest = metrics[rank.notna()].loc[rank.dropna().sort_values(kind="stable").index], metrics[rank.isna()]
+    shown = [
+        Table(title="Verdicts of the replay", columns=METRICS, rows=records(known), file="replay.csv", once=True)
+    ] if len(known) else []  # fmt: skip
+    plain = [column for column in METRICS if column.key not in ("valid", "verdict")]
+    title = "Metrics that are not judged"
+    more = Table(title=title, columns=plain, rows=records(rest), file="replay.csv", folded=True, once=True)
+    return (*shown, more) if len(rest) else tuple(shown)
 
 
 def explained(metrics: pd.DataFrame) -> str:

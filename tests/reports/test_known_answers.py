@@ -30,6 +30,7 @@ from crossbody.reports.measuring import alignment
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.metrics import event_gap
 from crossbody.reports.pages import (
+    errors,
     figures,
     friction,
     grid,
@@ -161,7 +162,12 @@ def test_pages_draw_any_motion_as_it_is(seed: int, monkeypatch: pytest.MonkeyPat
 
 PAGES: dict[str, tuple[Any, str, Callable[[Any], Any], str]] = {
     "a largest value": (playback, "_largest", lambda _: lambda lam: float(lam.max()), "playback"),
-    "errors with their sign": (figures, "apart", lambda _: lambda a, b, _: a - b, "motion figure"),
+    "errors with their sign": (figures, "apart", lambda _: lambda a, b, _: a - b, "force figure"),
+    "errors of the next coordinate": (
+        errors, "differences", lambda own: lambda *given: np.roll(own(*given), 1, axis=1), "motion figure",
+    ),
+    "rotations by their entries": (errors, "differences", lambda _: lambda a, b, _: np.abs(a - b), "rotations"),
+    "lines over long steps": (sheet, "LONG", lambda _: 2.0, "long steps"),
     "blows left out": (figures, "with_collisions", lambda own: lambda run, _: own(run, ()), "force figure"),
     "half an energy": (figures, "energy_of", lambda own: lambda run: 0.5 * own(run), "energy figure"),
     "depth above": (figures, "_depth", lambda _: lambda gap, _: gap, "penetration figure"),

@@ -13,6 +13,7 @@ from crossbody.cases import Tier
 from crossbody.reports.cli import main
 from crossbody.reports.pages import case_page, figures
 from crossbody.reports.pages.results import Results, read
+from crossbody.reports.runs.study import read_json
 from crossbody.reports.sections import replay
 
 
@@ -75,3 +76,37 @@ def test_a_limit_of_a_replay_is_said_as_it_was_asked_for(tmp_path: Path, capsys:
     for words in valid.values():
         assert f"valid: {words}. Asked for by --limit." in " ".join(said.split())
         assert f"({words})" in section.text
+
+
+def test_what_is_judged_of_a_replay_comes_first_and_all_else_is_folded(tmp_path: Path) -> None:
+    for limits, wanted in (((), []), (("fit=99.5", "rmse=1e9"), ["outside", "within"])):
+        given = [word for limit in limits for word in ("--limit", limit)]
+        with pytest.raises(SystemExit):
+            main(["replay", *commands(tmp_path)["replay"], *given, "-q", "--out", str(tmp_path / "out")])
+        (section,) = (one for one in replay.sections(tmp_path / "out") if one.name == "replay")
+        judged = [table for table in section.tables if not table.folded]
+        assert [row["verdict"] for table in judged for row in table.rows] == wanted
+        (rest,) = (table for table in section.tables if table.folded)
+        assert "rmse" in {row["metric"] for table in section.tables for row in table.rows}
+        assert not {"within", "outside"} & {row["verdict"] for row in rest.rows}
+
+
+def test_identify_says_first_what_it_found_and_what_of_the_log_it_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["identify", *commands(tmp_path)["identify"], "--hold", "0", "--out", str(tmp_path / "out")])
+    said = " ".join(capsys.readouterr().out.split())
+    first = said.partition(" is identified" if " is identified" in said else " are identified")[0]
+    assert len(first.split()) <= 4, "a sentence begins"
+    assert "left out of the fit: nothing shows whether it holds on others." in said
+    assert said.index("measurement: ") < said.index("name value")
+    for row in replay_findings(tmp_path / "out"):
+        assert row in said
+
+
+def replay_findings(out: Path) -> list[str]:
+    """What the checks of the log of a folder found."""
+    return [
+        " ".join(row["text"].split()) for row in read_json(out / "findings.json")["rows"] if row["what"] != "repair"
+    ]

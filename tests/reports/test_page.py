@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from html import escape, unescape
 from html.parser import HTMLParser
@@ -23,16 +24,17 @@ from jinja2 import Environment, FileSystemLoader
 from ladder import ladder
 from unpacked import numbers, value_of, whole
 
-from crossbody.cases import OutputError, load
+from crossbody import engines
+from crossbody.cases import CrossbodyError, OutputError, load
 from crossbody.reports.bench.order import observed_order
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns
-from crossbody.reports.figures.styles import COLOURS, DASHES, style
+from crossbody.reports.figures.styles import LOOKS, look, style
 from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.told import QUANTITIES, share
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import LACKS, Row, Verdict, Word
-from crossbody.reports.pages import figures, grid, html, site
+from crossbody.reports.pages import figures, grid, html, precision, site
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.pages.html import KeptTemplates, Page, plot
 from crossbody.reports.runs import study
@@ -413,10 +415,25 @@ def test_the_index_names_the_number_of_a_case_that_tells_most_of_those_of_the_wo
     assert f"<small>{named}</small>" in text
 
 
-def test_engines_look_different(result: CaseResult) -> None:
+def test_every_engine_has_a_colour_of_its_own() -> None:
+    """By its name, so it is the same in every report."""
+    for name in engines.names():
+        with suppress(CrossbodyError):  # one that is not installed
+            assert {f"{name}:{profile}" for profile in engines.load(name).profiles} <= set(LOOKS)
+    assert len({look(who)["color"].upper() for who in LOOKS}) == len(LOOKS)
+
+
+def test_an_engine_looks_the_same_wherever_it_stands(result: CaseResult) -> None:
     trace = next(one for one in study.traces(result) if one.truth is not None)
-    each = [replace(trace, about=dict(trace.about) | {"place": i}) for i in range(len(COLOURS) * len(DASHES))]
-    assert len({(style(one, 0)["color"], style(one, 0)["dash"]) for one in each}) == len(each)
+    for who in ("mujoco:default", "mine:own"):
+        engine, _, profile = who.partition(":")
+        one = replace(trace, about=dict(trace.about) | {"engine": engine, "profile": profile})
+        assert style(one) == look(who)
+        (mark,) = precision.scatter([(who, 1e-3, 1.0)])["data"]
+        alone = precision.cloud({who: [("a", 1e-3, 1.0)], "pinocchio:law": [("a", 1e-6, 2.0)]})["data"]
+        colours = {line["meta"]: line["marker"]["color"] for line in [mark, *alone]}
+        assert colours[who] == look(who)["color"]
+    assert look("mine:own") != look("mine:other")
 
 
 def test_run_time_is_drawn_against_error(out: Path) -> None:

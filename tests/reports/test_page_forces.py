@@ -87,13 +87,46 @@ def test_a_loop_is_whole(seed: int, times: float) -> None:
     weak = replace(made, lam=made.lam / times)
     (section,) = hysteresis([trace(weak), trace(made, "strong")])
     figure = section.plots[0].figure
-    assert "range" not in figure["layout"]["yaxis"]
+    assert "range" not in figure["layout"]["xaxis"]
+    assert ("range" in figure["layout"]["yaxis"]) == (times > 1.0)
+    if times > 1.0:
+        assert figure["layout"]["title"]["text"].endswith(f"Off scale: strong:p up to {lam.max():.3g} N (floor)")
+        assert figure["layout"]["yaxis"]["range"][1] == pytest.approx(1.5 * weak.lam.max())
     x, y = (numbers(figure["data"][1][axis]) for axis in "xy")
     assert y.max() == pytest.approx(lam.max())
     assert np.isfinite(x).all(), "nothing is broken where both depth and force are known"
     for i in np.flatnonzero((y[1:] > 0.0) != (y[:-1] > 0.0)):
         touch = i if y[i] == 0.0 else i + 1
         assert x[touch] == 0.0
+
+
+@pytest.mark.parametrize("times", [3.0, 100.0])
+def test_a_depth_far_beyond_the_truths_is_named_and_no_loop_is_a_line(run: Trajectory, times: float) -> None:
+    (section,) = hysteresis(
+        [trace(run), trace(replace(run, gap=times * run.gap), "soft")],
+        limits={"penetration_error": {0.1: "limit"}, "penetration": {2e-3: "limit"}},
+    )
+    layout = section.plots[0].figure["layout"]
+    depth = -float(run.gap.min())
+    assert ("range" in layout["xaxis"]) == (times > 4.0)
+    assert (f"Off scale: soft:p up to {times * depth:.3g} m (floor)" in layout["title"]["text"]) == (times > 4.0)
+    assert f"Limits of the depth: ±{0.1 * depth:.2g} m (limit)" in layout["title"]["text"]
+    assert [line["x0"] for line in layout["shapes"]] == [2e-3]
+
+
+def test_what_lies_on_a_rigid_floor_is_a_dot(run: Trajectory) -> None:
+    lies = replace(run, gap=np.zeros_like(run.gap), lam=np.full_like(run.lam, 9.81))
+    (section,) = hysteresis([trace(lies), trace(run, "soft")])
+    modes = {line["name"]: line["mode"] for line in section.plots[0].figure["data"]}
+    assert modes == {f"{TRUTH}": "lines+markers", "soft:p": "lines"}
+
+
+def test_limits_that_are_narrower_than_a_line_are_said(run: Trajectory) -> None:
+    for limit, said in ((1e-9, True), (0.5, False)):
+        traces = [replace(one, about=one.about | {"scales": [2.0]}) for one in (trace(run), trace(run, "fake"))]
+        figure = motion(traces, limits={"position": {limit: "limit"}})
+        text = f"Limits narrower than a line: height ±{2.0 * limit:.2g} m (limit)"
+        assert (text in figure["layout"]["title"]["text"]) == said
 
 
 @pytest.mark.parametrize("times", [1.6, 3.9])

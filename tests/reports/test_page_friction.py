@@ -117,6 +117,6 @@ def test_a_line_of_friction_ends_wherever_its_contact_opens(trace: Trace, seed: 
     n = 4000
     pressed = np.repeat(rng.uniform(size=n // 4) > 0.1, 4)
     x = np.where(pressed, np.arange(n, dtype=float), np.nan)
-    for a, b in pairwise(numbers(_line(trace, 0, (x, x), 100)["x"])):
+    for a, b in pairwise(numbers(_line(trace, (x, x), 100)["x"])):
         if np.isfinite(a) and np.isfinite(b):
             assert pressed[int(a) : int(b) + 1].all()

@@ -201,7 +201,7 @@ def test_marks_of_an_engine_are_named_beside_the_last(seed: int, tmp_path: Path,
         who: [(f"case {i}", 10.0 ** rng.uniform(-12, 0), 10.0 ** rng.uniform(-1, 3)) for i in range(6)]
         for who in engines
     }
-    cloud = precision.cloud(points, {who: k for k, who in enumerate(engines)})
+    cloud = precision.cloud(points)
     drawn(tmp_path, cloud, browser)
     assert sorted(browser.js(TEXTS)) == sorted(engines)
     assert browser.js(LEGEND) == 0
@@ -220,7 +220,7 @@ def test_marks_of_an_engine_are_named_beside_the_last(seed: int, tmp_path: Path,
         " return a.left >= b.left && a.right <= b.right; })"
     )
     assert browser.js(inside)
-    drawn(tmp_path, precision.cloud(points, {who: k for k, who in enumerate(engines)}), browser, width=400)
+    drawn(tmp_path, precision.cloud(points), browser, width=400)
     assert (browser.js(TEXTS), browser.js(LEGEND)) == ([], len(engines))
     assert browser.complaints() == []
 
@@ -276,9 +276,7 @@ def test_an_engine_that_is_hidden_leaves_every_table(name: str, page: Path, brow
 def test_marks_that_are_near_have_names_apart(width: int, tmp_path: Path, browser: chromium.Browser) -> None:
     engines = [f"engine:profile {k}" for k in range(6)]
     marks = [(who, 1e-9 * (1.0 + 0.02 * k), 5.0 + 0.1 * k) for k, who in enumerate(engines)]
-    figure = precision.scatter(
-        [*marks, ("far:off", float("inf"), 5.0)], {who: k for k, who in enumerate([*engines, "far:off"])}
-    )
+    figure = precision.scatter([*marks, ("far:off", float("inf"), 5.0)])
     drawn(tmp_path, figure, browser, width)
     assert sorted(browser.js(TEXTS)) == sorted([*engines, "far:off"])
     assert browser.js(OVERLAPS) == []
@@ -296,7 +294,7 @@ def test_a_name_covers_no_mark_where_its_other_side_is_free(
         ("far:off", 1e-3, 500.0),
         ("near:by", 1e-14, 0.05),
     ]
-    drawn(tmp_path, precision.scatter(marks, {who: k for k, (who, *_) in enumerate(marks)}), browser)
+    drawn(tmp_path, precision.scatter(marks), browser)
     ends = browser.js(
         "Object.fromEntries([...document.querySelectorAll('.names text:not(.limit)')]"
         ".map((text) => [text.textContent, text.getAttribute('text-anchor')]))"

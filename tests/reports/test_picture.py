@@ -13,6 +13,7 @@ from PIL import Image
 from crossbody.cases import InvalidValue, load
 from crossbody.engines import load as load_engine
 from crossbody.reports.cli import main
+from crossbody.reports.figures.styles import look
 from crossbody.reports.pages import picture
 from crossbody.reports.pages.picture import FORCE, HEIGHT, PUSH, Film
 from crossbody.reports.runs import study
@@ -61,12 +62,36 @@ def test_in_space_a_plane_and_a_solid_are_drawn_around_the_middle() -> None:
             assert (centre < 0.8).all()
 
 
+@pytest.mark.parametrize("t", [0.0, 0.46, 4.9])
+def test_a_picture_says_whose_it_is_and_when_and_how_long_a_metre_is(ball: Film, t: float) -> None:
+    strokes, texts = ball.legend(t)
+    said = [one.text for one in texts]
+    assert said[:2] == ["bouncing_ball:linear, reference:compiled", f"t = {t:.4f} s"]
+    assert strokes[0].color == look("reference:compiled")["color"]
+    scales = {"m": ball.to.scale, "N": FORCE * HEIGHT / ball.force}
+    assert [text.split()[1] for text in said[2:]] == list(scales)
+    for bar, text in zip(strokes[1:], said[2:], strict=True):
+        value, unit = text.split()
+        assert np.ptp(bar.points[:, 0]) == pytest.approx(float(value) * scales[unit], rel=1e-9)
+        assert 60.0 <= np.ptp(bar.points[:, 0]) <= 150.0
+    assert all(0.0 < one.x < picture.WIDTH and 0.0 < one.y < HEIGHT for one in texts)
+
+
+@pytest.mark.parametrize("name", ["bouncing_ball:linear", "rolling_sphere:straight"])
+def test_what_is_round_is_a_circle(name: str) -> None:
+    """In a file of lines, and of as many pixels as it is large."""
+    made = film(*name.split(":"))
+    (circle,) = [one for one in made.at(0.0) if one.radius]
+    assert np.linalg.norm(circle.points - circle.centre, axis=1) == pytest.approx(circle.radius, rel=1e-3)
+    assert f'r="{circle.radius:.2f}"' in picture.svg([circle])
+
+
 def test_files_of_every_kind(ball: Film, tmp_path: Path) -> None:
     for suffix in picture.SUFFIXES:
         picture.write(ball, tmp_path / f"ball{suffix}", None, 4.0, 1.0)
     text = (tmp_path / "ball.svg").read_text()
     assert re.match(r"<svg [^>]*viewBox", text)
-    assert text.count("<poly") == len(ball.at(0.0))
+    assert text.count("<poly") + text.count("<circle") == len(ball.at(0.0)) + len(ball.legend(0.0)[0])
     with Image.open(tmp_path / "ball.gif") as gif, Image.open(tmp_path / "ball.png") as still:
         assert still.size == gif.size == (picture.WIDTH, HEIGHT)
         assert 10 < gif.n_frames <= 21

@@ -62,7 +62,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Shown:
     with output.folder(out, "run") as made:
         study.assemble(made, [part], {})
         site.write(made)
-    return out, rows, results.times_of(out)
+    return out, rows, results.times_of(out)[0]
 
 
 @pytest.mark.parametrize("name", ["index.html", "case-bouncing_ball.linear.html"])

@@ -144,9 +144,26 @@ def test_the_sentence_says_of_what_the_largest_deviation_is_and_relative_to_what
         row("two:p", Word.OUTSIDE, "event_times", value=0.5, unit="s"),
     ]
     text = sentence(runs_of(rows))
-    assert "The largest deviation of position: one:p on ball:hard (position 0.034 of its largest value" in text
-    assert "34 times its limit: x by 0.0084 m at 1 s): Soft contacts." in text
+    assert "The largest deviation of position: one:p on ball:hard (position x by 0.0084 m at 1 s, 34 times" in text
+    assert "34 times its limit): Soft contacts." in text
     assert "Off: two:p on ball:hard (event_times 0.5 s, 5e+02 times its limit)" in text
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_of_positions_the_largest_of_each_unit_is_said(seed: int) -> None:
+    """Not the largest part of what a coordinate is: one that hardly moves is off by many times that."""
+    draw = np.random.default_rng(seed)
+    sizes = 10.0 ** draw.uniform(-6.0, 1.0, 6)
+    units = draw.choice(["m", "rad"], 6).tolist()
+    rows = [
+        row(f"e{k}:p", Word.EXPECTED, value=float(10.0 ** draw.uniform(-3.0, 3.0)), why=CAUSE,
+            where=f"x{k} by {size:.2g} {unit} at 1 s")
+        for k, (size, unit) in enumerate(zip(sizes, units, strict=True))
+    ]  # fmt: skip
+    said = sentence(runs_of(rows)).partition("The largest deviation")[2]
+    most = {max((k for k in range(6) if units[k] == unit), key=lambda k: float(f"{sizes[k]:.2g}")) for unit in units}
+    assert {k for k in range(6) if f"(position x{k} by" in said} == most
+    assert said.startswith("s of position, by unit: " if len(most) > 1 else " of position: ")
 
 
 def test_a_truth_in_doubt_is_no_run_that_is_off() -> None:
