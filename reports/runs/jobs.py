@@ -213,7 +213,7 @@ def _ran(
         settings=prepared.settings,
         default=not any(name in prepared.settings for name in asked),
         run=run,
-        clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled),
+        clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled, cpu_s=took),
         audit=rows,
         study=_study(case, pick, prepared, natural, run, took, OF_STUDIES * budget) if studied else None,
         hidden=hidden,
