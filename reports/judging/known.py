@@ -13,6 +13,7 @@ from types import ModuleType
 import numpy as np
 
 from crossbody.cases import installed
+from crossbody.cases.errors import OwnFault
 from crossbody.cases.sources import readable
 from crossbody.reference import code_store
 from crossbody.reports.sources import SHOWN, code
@@ -23,6 +24,12 @@ KINDS = (
     "judging.known_parts", "judging.known_steps", "judging.known_tables", "judging.known_equations",
     "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
 )  # fmt: skip
+OF_COMMANDS = {
+    "replay": ("replay.known_replay",), "bench": ("bench.known_bench",), "analyse": ("analysis.known_analysis",),
+}  # fmt: skip
+"""Of commands that judge no run: they ask before they say a number."""
+RUNS = "known_answers"
+"""Under which name it is kept that those of runs were right."""
 RIGHT = b"every known answer was right"
 
 once = False
@@ -31,28 +38,46 @@ once = False
 
 def wrong() -> Iterator[Found]:
     """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another."""
+    yield from _once(RUNS, KINDS)
+
+
+def check(command: str) -> None:
+    """Ask what a command says of made-up motions, logs and tables before it says anything else.
+
+    Raises:
+        OwnFault: with the first number that is another one than must be.
+    """
+    found = _once(f"{RUNS}_{command}", OF_COMMANDS[command])
+    for name, value, (least, most), what in found:
+        must = f"{least:.9g}" if least == most else f"between {least:.9g} and {most:.9g}"
+        more = f" {len(found) - 1} more numbers are wrong." if len(found) > 1 else ""
+        raise OwnFault(f"No number can be trusted: {name} of {what} is {value:.9g}, but must be {must}.{more}")
+
+
+def _once(kept: str, names: tuple[str, ...]) -> tuple[Found, ...]:
+    """Return what is wrong of some modules, asked once for each version of the code."""
     store = code_store.current() if once and readable() else None
-    name = "" if store is None else _name()
+    name = "" if store is None else _name(kept)
     if store is not None and store.has(name) and store.read(name) == RIGHT:
-        return
-    found = tuple(_asked())
+        return ()
+    found = tuple(_asked(names))
     if store is not None and not found:
         store.write(name, RIGHT)
-    yield from found
+    return found
 
 
-def _asked() -> Iterator[Found]:
+def _asked(names: tuple[str, ...] = KINDS) -> Iterator[Found]:
     """Ask all of them."""
-    for kind in kinds():
+    for kind in kinds(names):
         yield from kind.wrong()
 
 
-def kinds() -> tuple[ModuleType, ...]:
+def kinds(names: tuple[str, ...] = KINDS) -> tuple[ModuleType, ...]:
     """Return the modules that ask, each by its `wrong`: found by name, since pages import what is judged."""
-    return tuple(import_module(f"crossbody.reports.{name}") for name in KINDS)
+    return tuple(import_module(f"crossbody.reports.{name}") for name in names)
 
 
-def _name() -> str:
+def _name(kept: str = RUNS) -> str:
     """Return under which name it is kept that all were right: readable, then a digest of all that they depend on."""
     from crossbody.reference.cache import debugging, machine
 
@@ -64,4 +89,4 @@ def _name() -> str:
         str(debugging()),
         repr(sorted(installed.digests().items())),
     )
-    return code_store.named("known_answers", *depends)
+    return code_store.named(kept, *depends)
