@@ -32,7 +32,21 @@ DETECTORS = {
     "dart": dartpy.collision.DARTCollisionDetector, "fcl": dartpy.collision.FCLCollisionDetector,
     "bullet": dartpy.collision.BulletCollisionDetector, "ode": dartpy.collision.OdeCollisionDetector,
 }  # fmt: skip
+OWN = "dart"
 SOLIDS = ("plane", "sphere", "box", "capsule", "ellipsoid")
+
+
+def detector_of(scene: Scene, usual: str) -> str:
+    """Return what finds the contacts of a scene: FCL where DART's own detector would make a hull of an ellipsoid."""
+    return "fcl" if usual == OWN and any(map(_slants, _touching(scene))) else usual
+
+
+def _touching(scene: Scene) -> list[Shape]:
+    return [shape for contact in contacts(scene) for shape in (contact.first, contact.second)]
+
+
+def _slants(shape: Shape) -> bool:
+    return shape.type == "ellipsoid" and len(set(shape.size)) > 1
 
 
 def why_not(scene: Scene, detector: str) -> str | None:
@@ -55,6 +69,11 @@ def why_not(scene: Scene, detector: str) -> str | None:
                 return (
                     f"DART with FCL's detector treats the capsule {shape.name!r} as a sphere; its own "
                     "detector has capsules."
+                )
+            if detector == OWN and _slants(shape):
+                return (
+                    f"DART's own detector treats the ellipsoid {shape.name!r} as a hull of 162 points, which touches "
+                    "late; FCL's has ellipsoids."
                 )
     return None
 
