@@ -100,8 +100,8 @@ class Dart(Engine):
     name = "dart"
     profiles: Mapping[str, str] = {
         "matched": "the restitution of the law's linear part, own step (1 ms) and solver (Dantzig): first order; "
-        "for solids with friction DART's own detector, which treats boxes as boxes, FCL's where there are ellipsoids, of "
-        "which that makes hulls, and nothing is put to sleep",
+        "for solids with friction DART's own detector, which treats boxes as boxes, or FCL's where there are "
+        "ellipsoids, of which that makes hulls, and nothing is put to sleep",
         "default": "default: no restitution, FCL's detector, which supports meshes; only for scenes with friction",
     }
     hidden = HIDDEN
@@ -141,7 +141,8 @@ class Dart(Engine):
             "dt": Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True),
             "restitution": Parameter(default=_bounce(case) if matched else 0.0, doc="of contacts", low=0.0, high=1.0),
             "detector": Parameter(
-                default=_contacts.detector_of(case.scene, DETECTOR[profile]), choices=tuple(_contacts.DETECTORS), doc="what finds contacts"
+                default=_contacts.detector_of(case.scene, DETECTOR[profile]), choices=tuple(_contacts.DETECTORS),
+                doc="what finds contacts",
             ),
             "sleep": Parameter(default=not matched, doc="whether bodies at rest are put to sleep", low=0, high=1),
             "max_steps": STEPS,
