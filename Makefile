@@ -1,6 +1,7 @@
 # make run    set up and run the main job: the bouncing ball on every engine, judged, with a report
 # make test   set up and pass the tests
 # make strict the main job, failing too where a number left its regression band; make bands stores the bands anew
+# make scripts  store by what pages are drawn, once a browser has been asked
 # make faults plant faults in a copy of the sources and see whether runs and tests fail (JOBS=2: two at a time)
 # make speed  measure the tables of docs/explanation/speed.md anew, about twenty minutes on a machine that does nothing else
 # make walkers  measure the tables of walking robots in docs/explanation/contacts.md and the README anew, some minutes
@@ -10,7 +11,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test slow bench peers faults strict bands check docs wheel-check picture speed walkers format clean
+.PHONY: run test slow bench peers faults strict bands scripts check docs wheel-check picture speed walkers format clean
 
 run: $(READY)
 	$(BIN)/crossbody run --out out
@@ -36,6 +37,8 @@ faults: $(READY)
 strict: $(READY)
 	$(BIN)/crossbody run --strict --out build/strict
 
+scripts: $(READY)
+	$(BIN)/pytest -q $(shell ls tests/reports/test_page_*.py) && $(BIN)/python -m crossbody.reports.pages.known_scripts
 bands: $(READY)
 	$(BIN)/python -m crossbody.reports.commands.bands
 

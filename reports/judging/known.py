@@ -6,8 +6,11 @@ that runs and judges are made of, plug-ins, versions of libraries, and the proce
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -23,6 +26,7 @@ KINDS = (
     "judging.known_answers", "judging.known_sides", "judging.known_sources", "judging.known_growth",
     "judging.known_parts", "judging.known_steps", "judging.known_tables", "judging.known_equations",
     "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
+    "pages.known_scripts",
 )  # fmt: skip
 OF_COMMANDS = {
     "replay": ("replay.known_replay",), "bench": ("bench.known_bench",), "analyse": ("analysis.known_analysis",),
@@ -77,12 +81,22 @@ def kinds(names: tuple[str, ...] = KINDS) -> tuple[ModuleType, ...]:
     return tuple(import_module(f"crossbody.reports.{name}") for name in names)
 
 
+def _templates() -> str:
+    """Return the digest of what pages are filled into, which is no Python."""
+    folder, found = Path(__file__).parents[1] / "pages" / "templates", hashlib.sha256()
+    for entry in sorted(os.scandir(folder), key=lambda one: one.name):
+        if entry.is_file() and not entry.name.endswith(".min.js"):
+            found.update(entry.name.encode() + Path(entry.path).read_bytes())
+    return found.hexdigest()
+
+
 def _name(kept: str = RUNS) -> str:
     """Return under which name it is kept that all were right: readable, then a digest of all that they depend on."""
     from crossbody.reference.cache import debugging, machine
 
     depends = (
         code(SHOWN),
+        _templates(),
         *machine(),
         np.__version__,
         installed.version("scipy"),
