@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
@@ -306,8 +307,19 @@ class Rubs:
         return {
             "masses": masses(self.scene, own), "gravity": float(np.linalg.norm(self.world.getGravity())),
             "M": M, "bias": bias, "q0": self.case.q0, "v0": self.case.v0,
-            "hidden": dict.fromkeys(RIGID, "Its contacts are rigid, and are solved within a step."),
+            "set": self._set(), "hidden": dict.fromkeys(RIGID, "Its contacts are rigid, and are solved within a step."),
         }  # fmt: skip
+
+    def _set(self) -> dict[str, Any]:
+        """Return settings as the world has them: of pairs the product of both restitutions."""
+        solver = self.world.getConstraintSolver()
+        found: dict[str, Any] = {"detector": solver.getCollisionDetector().getType()}
+        bounces = [
+            math.prod(node.getShapeNode(0).getDynamicsAspect().getRestitutionCoeff() for node in pair)
+            for pair in self.pairs
+        ]
+        found |= {"restitution": bounces[0]} if len(set(bounces)) == 1 else {}
+        return found | {"sleep": bool(self.world.getDeactivationOptions().mEnabled)}
 
     def counts(self) -> Mapping[str, int]:
         """See `Stepper`."""

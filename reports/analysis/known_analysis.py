@@ -124,13 +124,13 @@ def _responses() -> Iterator[Asked]:
 
 
 def _ranks() -> Iterator[Asked]:
-    """Yield ranks of a model of which one state is not reached, and another not shown."""
+    """Yield ranks of a model of which one state is not reached, and two are not shown."""
     model = LinearModel(
-        A=np.diag([-1.0, -2.0, -0.5]), B=np.array([[1.0], [1.0], [0.0]]), C=np.array([[1.0, 0.0, 1.0]]),
+        A=np.diag([-1.0, -2.0, -0.5]), B=np.array([[1.0], [1.0], [0.0]]), C=np.array([[1.0, 0.0, 0.0]]),
         D=np.zeros((1, 1)), states=("a", "b", "c"), inputs=("u",), outputs=("y",),
     )  # fmt: skip
     (row,) = _rows(numbers.ranks([_place(model)]))
-    told = {"states": 3.0, "controllable": 2.0, "observable": 2.0, "growth": -0.5}
+    told = {"states": 3.0, "controllable": 2.0, "observable": 1.0, "growth": -0.5}
     for name, must in told.items():
         yield name, "a diagonal model", float(row[name]), must
     led = numbers.poles([_place(model)])["led_by"].tolist()

@@ -26,7 +26,7 @@ KINDS = (
     "judging.known_answers", "judging.known_sides", "judging.known_sources", "judging.known_growth",
     "judging.known_parts", "judging.known_steps", "judging.known_tables", "judging.known_equations",
     "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
-    "pages.known_scripts",
+    "judging.known_files", "judging.known_verdicts", "pages.known_scripts",
 )  # fmt: skip
 OF_COMMANDS = {
     "replay": ("replay.known_replay",), "bench": ("bench.known_bench",), "analyse": ("analysis.known_analysis",),

@@ -86,6 +86,26 @@ def _sliders() -> Iterator[tuple[str, str, float, float]]:
         "energy_switching": jumps / most,
         "energy_switching_error": abs(jumps - float(book.contact[-1].sum())) / most,
     }, "sliders that are switched", (run, run), case)  # fmt: skip
+    for deep in (0, 1, 2):
+        yield from _said({"violated_modes": float(deep)}, f"{deep} rows below their surfaces", *_below(case, deep, t))
+
+
+def _below(case: Case, deep: int, t: Floats) -> tuple[tuple[Trajectory, Trajectory], Case]:
+    """Return a motion at rest in which some rows are below their surfaces though nothing pushes, twice, and its case."""
+    apart = np.where(np.arange(2) < deep, -2.0, 1.0) * GAP
+    q = np.tile([0.0, *np.cumsum(apart)], (len(t), 1))
+    none = np.zeros((len(t), 2))
+    run = Trajectory(
+        t=t,
+        q=q,
+        v=0.0 * q,
+        gap=GAP + np.diff(q, axis=1),
+        lam=none,
+        energy=none,
+        mode=none.astype(np.int8),
+        steps=len(t),
+    )
+    return (run, run), case
 
 
 def _held(h: Floats, on: list[bool]) -> float:

@@ -68,6 +68,24 @@ column = "h"
 unit = "mm"
 delay = 0.004
 """
+TICK, STEP_TICKS = 2.5e-5, 400
+"""Length of a tick of a clock, s, and how many of them are between samples."""
+TICKS = "clock,h,temperature,speed\n1000,1,20,0\n1400,2,20.5,60\n1800,3,21,120\n"
+COUNTED = """
+[time]
+column = "clock"
+unit = "ms"
+scale = 0.025
+[coordinates.height]
+column = "h"
+unit = "mm"
+[sensors.warmth]
+column = "temperature"
+unit = "degC"
+[sensors.turns]
+column = "speed"
+unit = "rpm"
+"""
 WALL = 0.5
 """Time that a prediction is told to have taken, s."""
 
@@ -130,6 +148,11 @@ def _reading() -> Iterator[Asked]:
     for what, found, wanted in pairs:
         worst = int(np.argmax(np.abs(found - wanted)))
         yield "log", f"{what} of a made-up log", float(found[worst]), float(wanted[worst]), EXACT * (BEGINS + 10.0)
+    ticks = _read(TICKS, COUNTED)
+    yield "log", "times of whole ticks", float(ticks.time[-1] - ticks.time[0]), 2.0 * TICK * STEP_TICKS, EXACT
+    warm, rate = (ticks.channel("sensors", name).values[1] for name in ("warmth", "turns"))
+    yield "log", "a temperature in degrees", float(warm), 273.15 + 20.5, 1e-9
+    yield "log", "a rate in turns a minute", float(rate), 60.0 * 2.0 * math.pi / 60.0, 1e-9
     late = _read("t,h\n0,1\n0.01,2\n0.02,3\n", BALL)
     true = late.times("coordinates", "height")
     yield "log", "when a late height was true", float(true[1]), STEP - DELAY, EXACT

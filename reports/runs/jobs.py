@@ -17,7 +17,7 @@ from crossbody.cases.errors import OwnFault
 from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
-from crossbody.reports.judging.audit import AuditRow, answered_once, audit
+from crossbody.reports.judging.audit import AuditRow, answered_once, audit, settings_kept
 from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.comparison import check_names, judges_parts
 from crossbody.reports.judging.covered import covered
@@ -196,7 +196,7 @@ def _ran(
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     own = {name: value for name, value in asked.items() if name in prepared.settings}
-    rows += start_of_file(case)
+    rows += (*settings_kept(shown, prepared.settings), *start_of_file(case))
     rows += first_steps(case, (engines.load(pick.engine), prepared.profile), prepared.settings, own, rows, reference)
     began, clock, compiled = process_time(), perf_counter(), count.seconds
     made = prepared.run()
