@@ -184,7 +184,7 @@ def audit(
 
 
 def settings_kept(mine: Mapping[str, Any], used: Mapping[str, Any]) -> tuple[AuditRow, ...]:
-    """Return a row of settings that a run is said to have had, and that an engine's model has; none where it shows none.
+    """Return a row of settings that a run is said to have, and that an engine's model has; none if it shows none.
 
     Args:
         mine: what `Run.audit()` of an engine shows: its own under `set`.

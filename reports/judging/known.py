@@ -26,10 +26,13 @@ KINDS = (
     "judging.known_answers", "judging.known_sides", "judging.known_sources", "judging.known_growth",
     "judging.known_parts", "judging.known_steps", "judging.known_tables", "judging.known_equations",
     "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
-    "judging.known_files", "judging.known_verdicts", "pages.known_scripts",
+    "judging.known_verdicts", "pages.known_scripts",
 )  # fmt: skip
+OF_FILES = ("judging.known_files",)
+"""Of runs of files, beside: compilers take longer to import than all else that a short run does."""
 OF_COMMANDS = {
     "replay": ("replay.known_replay",), "bench": ("bench.known_bench",), "analyse": ("analysis.known_analysis",),
+    "picture": ("pages.known_pictures",),
 }  # fmt: skip
 """Of commands that judge no run: they ask before they say a number."""
 RUNS = "known_answers"
@@ -40,9 +43,14 @@ once = False
 """Whether what was right is believed: where a command has a process of its own, so that nobody replaced functions."""
 
 
-def wrong() -> Iterator[Found]:
-    """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another."""
+def wrong(*, file: bool = False) -> Iterator[Found]:
+    """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another.
+
+    Those of readers of files are asked where a file is run.
+    """
     yield from _once(RUNS, KINDS)
+    if file:
+        yield from _once(f"{RUNS}_files", OF_FILES)
 
 
 def check(command: str) -> None:

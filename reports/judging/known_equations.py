@@ -91,7 +91,7 @@ def _sliders() -> Iterator[tuple[str, str, float, float]]:
 
 
 def _below(case: Case, deep: int, t: Floats) -> tuple[tuple[Trajectory, Trajectory], Case]:
-    """Return a motion at rest in which some rows are below their surfaces though nothing pushes, twice, and its case."""
+    """Return a motion at rest, twice, with some rows below their surfaces though nothing pushes, and its case."""
     apart = np.where(np.arange(2) < deep, -2.0, 1.0) * GAP
     q = np.tile([0.0, *np.cumsum(apart)], (len(t), 1))
     none = np.zeros((len(t), 2))

@@ -1,4 +1,4 @@
-"""What must be read from an MJCF and a URDF whose every number is another one: no engine contradicts what all are given.
+"""What must be read from an MJCF and a URDF whose numbers all differ: no engine contradicts what all are given.
 
 Engines are given the scene that was read, so that none of them contradicts what is read wrongly. What stands in the
 files is written out here in the scene's terms: degrees in radians, products of inertia in their places, rotations by

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Mode, Trajectory
+from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Loop, Pair, Scene, Shape
 from crossbody.cases.scene_plain import plain
 from crossbody.reports import scenes
 from crossbody.reports.figures.styles import COLOURS
-from crossbody.reports.pages import friction, picture, playback
+from crossbody.reports.pages import friction, playback
 from crossbody.reports.pages.known_figures import drawn
 from crossbody.reports.pages.made_up_traces import (
     CONTACTS,
@@ -29,7 +29,6 @@ from crossbody.reports.pages.made_up_traces import (
     lines,
     numbers,
 )
-from crossbody.reports.runs.store import Trace
 from crossbody.reports.scenes import Stage
 
 MU, WEIGHTS = 0.37, (1.0, 2.0)
@@ -206,34 +205,7 @@ def _pairs_of_balls() -> Iterator[Said]:
     yield "both arrows of balls in a row", scenes.pushes(centres, lam, r), [*left, *right]
 
 
-def _pictures() -> Iterator[Said]:
-    """Yield where a ball is in pictures between its samples, and how long the arrow of its force is, in pixels."""
-    height, t = 2.0, np.array([0.0, 1.0, 2.0, 4.0])
-    q, lam = np.array([[2.0], [0.5], [0.0], [1.6]]), np.array([[0.0], [3.0], [12.0], [6.0]])
-    run = Trajectory(
-        t=t, q=q, v=np.array([[-1.0], [-1.0], [0.8], [0.8]]), gap=q, lam=lam, energy=np.ones((4, 2)) * t[:, None],
-        mode=np.zeros((4, 1), dtype=np.int8),
-    )  # fmt: skip
-    about = drawn().about | {
-        "mechanism": "ball", "parameters": {"height": height}, "contacts": ("floor",), "engine": "one", "profile": "p",
-        "coordinates": [{"name": "height", "unit": "m"}], "turning": (), "scales": [2.0], "gap_scales": [2.0],
-    }  # fmt: skip
-    film, r = picture.Film(Trace(about=about, run=run, truth=None)), 0.12 * height
-    spots = {}
-    for when, high in ((0.0, 2.0), (0.5, 1.25), (1.0, 0.5), (3.0, 0.8), (4.0, 1.6)):
-        strokes = film.at(when)
-        ball = next(one.points for one in strokes if one.fill and one.color != picture.PUSH)
-        spots[high] = 0.5 * (ball.min(axis=0) + ball.max(axis=0))
-        scale = float(np.ptp(ball[:, 1])) / (2.0 * r)
-        yield f"how far a ball at {high:g} m is below its start", (spots[high] - spots[2.0])[1], scale * (2.0 - high)
-        pushes = [one.points for one in strokes if one.color == picture.PUSH and not one.fill]
-        force = {0.0: 0.0, 0.5: 0.0, 1.0: 3.0, 3.0: 12.0, 4.0: 6.0}[when]
-        yield f"arrows at {when:g} s", float(len(pushes)), float(force > 0.0)
-        for a, b in pushes:
-            yield f"the arrow at {when:g} s", a - b, [0.0, picture.FORCE * picture.HEIGHT * force / 12.0]
-
-
 KINDS = {
-    "pictures": _pictures, "arrows of rows": _rows, "arrows of balls": _pairs_of_balls, "playback": _playback,
+    "arrows of rows": _rows, "arrows of balls": _pairs_of_balls, "playback": _playback,
     "loops of force": _loops, "friction figures": _friction, "loops": _sides,
 }  # fmt: skip

@@ -16,6 +16,7 @@ from crossbody.cases import Trajectory
 from crossbody.reports.judging import (
     judge_controls,
     known,
+    known_files,
     known_growth,
     known_parts,
     known_sides,
@@ -43,7 +44,7 @@ from crossbody.reports.pages import (
 )
 from crossbody.reports.pages.made_up_traces import Drawn
 
-KNOWN = known.kinds()
+KNOWN = (*known.kinds(), *known.kinds(known.OF_FILES))
 
 
 @pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
@@ -55,6 +56,8 @@ def test_what_is_right_is_not_told(module: Any) -> None:
 def test_what_is_wrong_is_a_row_of_every_run(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "wrong", lambda: (("position", 1.0, (2.0, 2.0), "a motion"),))
     case = cases.load("bouncing_ball", "elastic")
+    if module is known_files:  # asked where a file is run
+        case = replace(case, file="robot.xml")
     rows = judge_controls.blind(case, shortened(truth_of(case)), "")
     assert [(row.metric, row.verdict) for row in rows] == [("position (control)", "outside")]
 

@@ -18,6 +18,7 @@ from crossbody.reports.analysis import known_analysis, numbers
 from crossbody.reports.bench import known_bench, measure
 from crossbody.reports.cli import cli
 from crossbody.reports.judging import known
+from crossbody.reports.pages import known_pictures
 from crossbody.reports.replay import known_replay
 
 SUPPORT = Path(__file__).parents[1] / "support"
@@ -27,9 +28,10 @@ COMMANDS = {
     "identify": ("identify", *LOG, "--free", "gravity", "--hold", "0", "--out", "out"),
     "bench": ("bench", "bouncing_ball", "--variant", "linear", "--repeats", "1", "-q", "--out", "out"),
     "analyse": ("analyse", "bouncing_ball", "--variant", "linear", "-q"),
+    "picture": ("picture", "none", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
 }  # fmt: skip
-MODULES = {"replay": known_replay, "bench": known_bench, "analyse": known_analysis}
+MODULES = {"replay": known_replay, "bench": known_bench, "analyse": known_analysis, "picture": known_pictures}
 
 
 @pytest.mark.parametrize("name", MODULES)
