@@ -48,8 +48,9 @@ class Run(ABC):
         """Return the physics as it reached the engine, for the parity audit.
 
         Keys: masses, gravity, constants, q0, v0; and where the engine exposes them the functions
-        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates; and `hidden`, quantity
-        -> why this mechanism's model does not show it, beside what the engine's own `hidden` says.
+        `M(q)`, `bias(q, v)`, `H(q)` and `lam(q, v)` in the case's coordinates; `set`, setting -> its value
+        as the engine's own model has it; and `hidden`, quantity -> why this mechanism's model does not show
+        it, beside what the engine's own `hidden` says.
         """
 
     def native(self) -> float:

@@ -287,7 +287,12 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float | No
 
     FILE.svg or FILE.png shows one instant, FILE.gif the whole motion.
     """
+    from crossbody.reports.judging import known
     from crossbody.reports.pages import picture as drawing
+    from crossbody.reports.runs import watch
+
+    known.once = watch.alone()
+    known.check("picture")
     from crossbody.reports.pages.results import motion
 
     trace = motion(folder, case, engine)

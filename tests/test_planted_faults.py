@@ -32,7 +32,7 @@ def test_every_fault_can_be_planted_and_says_what_sees_it(fault: Fault) -> None:
     assert (plant_faults.ROOT / fault.file).read_text(encoding="utf-8").count(fault.old) == 1
     assert fault.checks
     for kind, arguments in fault.checks:
-        assert kind == "run" or Path(plant_faults.ROOT / arguments.split()[0].partition("::")[0]).is_file()
+        assert kind in ("run", "command") or Path(plant_faults.ROOT / arguments.split()[0].partition("::")[0]).is_file()
 
 
 def test_ten_are_a_sample_of_at_least_eighty() -> None:

@@ -100,7 +100,8 @@ class Dart(Engine):
     name = "dart"
     profiles: Mapping[str, str] = {
         "matched": "the restitution of the law's linear part, own step (1 ms) and solver (Dantzig): first order; "
-        "for solids with friction DART's own detector, which treats boxes as boxes, and nothing is put to sleep",
+        "for solids with friction DART's own detector, which treats boxes as boxes, or FCL's where there are "
+        "ellipsoids, of which that makes hulls, and nothing is put to sleep",
         "default": "default: no restitution, FCL's detector, which supports meshes; only for scenes with friction",
     }
     hidden = HIDDEN
@@ -113,7 +114,8 @@ class Dart(Engine):
         _settings.check_case(case)
         _settings.profile_of(self.name, self.profiles, profile)
         if case.scene is not None and frictional(case.scene):
-            return why_beside("DART", case) or _contacts.why_not(case.scene, DETECTOR[profile])
+            detector = _contacts.detector_of(case.scene, DETECTOR[profile])
+            return why_beside("DART", case) or _contacts.why_not(case.scene, detector)
         if profile == "default":
             return "Without friction it differs from the profile matched only in its restitution, which is a setting."
         return why_not("DART", case) or no_rigid_contact(case)
@@ -133,18 +135,19 @@ class Dart(Engine):
 
     def _stepped(self, case: Case, profile: str, given: Mapping[str, Any]) -> Run:
         """Return a run of a scene with friction."""
+        assert case.scene is not None
         matched = profile == "matched"
         known = {
             "dt": Parameter(default=min(1e-3, case.t_end), unit="s", doc="time step", low=0.0, open_low=True),
             "restitution": Parameter(default=_bounce(case) if matched else 0.0, doc="of contacts", low=0.0, high=1.0),
             "detector": Parameter(
-                default=DETECTOR[profile], choices=tuple(_contacts.DETECTORS), doc="what finds contacts"
+                default=_contacts.detector_of(case.scene, DETECTOR[profile]), choices=tuple(_contacts.DETECTORS),
+                doc="what finds contacts",
             ),
             "sleep": Parameter(default=not matched, doc="whether bodies at rest are put to sleep", low=0, high=1),
             "max_steps": STEPS,
         }  # fmt: skip
         used = _settings.chosen(self.name, profile, known, given)
-        assert case.scene is not None
         if reason := _contacts.why_not(case.scene, str(used["detector"])):
             raise CaseUnsupported(reason)
         stepper = _contacts.Rubs(case, used)

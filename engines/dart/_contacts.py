@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
@@ -32,7 +33,21 @@ DETECTORS = {
     "dart": dartpy.collision.DARTCollisionDetector, "fcl": dartpy.collision.FCLCollisionDetector,
     "bullet": dartpy.collision.BulletCollisionDetector, "ode": dartpy.collision.OdeCollisionDetector,
 }  # fmt: skip
+OWN = "dart"
 SOLIDS = ("plane", "sphere", "box", "capsule", "ellipsoid")
+
+
+def detector_of(scene: Scene, usual: str) -> str:
+    """Return what finds the contacts of a scene: FCL where DART's own detector would make a hull of an ellipsoid."""
+    return "fcl" if usual == OWN and any(map(_slants, _touching(scene))) else usual
+
+
+def _touching(scene: Scene) -> list[Shape]:
+    return [shape for contact in contacts(scene) for shape in (contact.first, contact.second)]
+
+
+def _slants(shape: Shape) -> bool:
+    return shape.type == "ellipsoid" and len(set(shape.size)) > 1
 
 
 def why_not(scene: Scene, detector: str) -> str | None:
@@ -55,6 +70,11 @@ def why_not(scene: Scene, detector: str) -> str | None:
                 return (
                     f"DART with FCL's detector treats the capsule {shape.name!r} as a sphere; its own "
                     "detector has capsules."
+                )
+            if detector == OWN and _slants(shape):
+                return (
+                    f"DART's own detector treats the ellipsoid {shape.name!r} as a hull of 162 points, which touches "
+                    "late; FCL's has ellipsoids."
                 )
     return None
 
@@ -287,8 +307,19 @@ class Rubs:
         return {
             "masses": masses(self.scene, own), "gravity": float(np.linalg.norm(self.world.getGravity())),
             "M": M, "bias": bias, "q0": self.case.q0, "v0": self.case.v0,
-            "hidden": dict.fromkeys(RIGID, "Its contacts are rigid, and are solved within a step."),
+            "set": self._set(), "hidden": dict.fromkeys(RIGID, "Its contacts are rigid, and are solved within a step."),
         }  # fmt: skip
+
+    def _set(self) -> dict[str, Any]:
+        """Return settings as the world has them: of pairs the product of both restitutions."""
+        solver = self.world.getConstraintSolver()
+        found: dict[str, Any] = {"detector": solver.getCollisionDetector().getType()}
+        bounces = [
+            math.prod(node.getShapeNode(0).getDynamicsAspect().getRestitutionCoeff() for node in pair)
+            for pair in self.pairs
+        ]
+        found |= {"restitution": bounces[0]} if len(set(bounces)) == 1 else {}
+        return found | {"sleep": bool(self.world.getDeactivationOptions().mEnabled)}
 
     def counts(self) -> Mapping[str, int]:
         """See `Stepper`."""

@@ -223,7 +223,7 @@ def build(
     if switched is not None and switched.nc > switched.always:
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
         prepared.entered = switched.entered
-    prepared.audit = _audit(case, profile, scene, model, rows)
+    prepared.audit = _audit(case, profile, scene, model, rows) | {"set": _set(model, cone, impratio, noslip, timeconst)}
     return prepared
 
 
@@ -240,6 +240,15 @@ def _set_cone(option: Any, cone: str, impratio: float, noslip: int) -> None:
         option.impratio = impratio
     if noslip >= 0:
         option.noslip_iterations = noslip
+
+
+def _set(model: Any, cone: str, impratio: float, noslip: int, timeconst: float) -> dict[str, Any]:
+    """Return those of these settings that are not left to the model, as it has them."""
+    names = {number: name for name, number in CONE.items()}
+    found: dict[str, Any] = {"cone": names[int(model.opt.cone)]} if cone != "own" else {}
+    found |= {"impratio": float(model.opt.impratio)} if impratio > 0.0 else {}
+    found |= {"noslip": int(model.opt.noslip_iterations)} if noslip >= 0 else {}
+    return found | ({"timeconst": float(model.geom_solref[:, 0].max(initial=0.0))} if timeconst > 0.0 else {})
 
 
 def _guard(case: Case, data: Any, rows: Rows) -> Callable[[], bool]:

@@ -61,13 +61,13 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
                 rows.append({**about, "verdict": Word.SKIPPED.value, "why": str(error)})
                 continue
             for way in ways:
-                row, pairs = _compared(place, way)
+                row, pairs = compared(place, way)
                 rows.append({**about, **row})
                 poles += [{**about, "way": way.way, **pair} for pair in pairs]
     return pd.DataFrame(rows, columns=list(COLUMNS)), pd.DataFrame(poles, columns=list(POLE_COLUMNS))
 
 
-def _compared(place: Place, way: Tangent) -> tuple[dict[str, Any], list[dict[str, float]]]:
+def compared(place: Place, way: Tangent) -> tuple[dict[str, Any], list[dict[str, float]]]:
     """One way beside the reference: its row, and its poles."""
     n = len(place.trim.v)
     full = place.linearised(reduce=False).A

@@ -165,10 +165,11 @@ def bench(
     rungs = list(_rungs(case, picks, effort, tell, limit))
     watch.unlimited()  # all have come back once
     _rounds(rungs, effort)
-    return pd.DataFrame([_row(case, rung) for rung in rungs], columns=list(COLUMNS))
+    return pd.DataFrame([row_of(case, rung) for rung in rungs], columns=list(COLUMNS))
 
 
-def _row(case: Case, rung: Rung) -> dict[str, Any]:
+def row_of(case: Case, rung: Rung) -> dict[str, Any]:
+    """Return a row of the table of a rung that was timed."""
     low, median, high = (1e3 * float(x) for x in np.percentile(rung.inner, (25, 50, 75)))
     return {
         "case": case.label, "engine": rung.pick.engine, "profile": rung.pick.profile, "against": rung.against,

@@ -183,6 +183,28 @@ def audit(
     return (*numbers, *functions)
 
 
+def settings_kept(mine: Mapping[str, Any], used: Mapping[str, Any]) -> tuple[AuditRow, ...]:
+    """Return a row of settings that a run is said to have, and that an engine's model has; none if it shows none.
+
+    Args:
+        mine: what `Run.audit()` of an engine shows: its own under `set`.
+        used: `Run.settings`.
+    """
+    own = {name: value for name, value in mine.get("set", {}).items() if name in used}
+    if not own:
+        return ()
+    off = max(_apart(value, used[name]) for name, value in own.items())
+    said = (" ".join(f"{name}={one[name]}" for name in own) for one in (own, used))
+    return (AuditRow(quantity="settings", mine=next(said), theirs=next(said), difference=off, tolerance=TOLERANCE),)
+
+
+def _apart(mine: Any, asked: Any) -> float:
+    """Return how far a setting is from what was asked for, as a part of that; infinite for another word."""
+    if isinstance(mine, str) or isinstance(asked, str):
+        return 0.0 if mine == asked else np.inf
+    return difference(float(mine), float(asked))
+
+
 def _laws(mine: Mapping[str, Any], case: Case) -> Iterator[AuditRow]:
     """Yield how far a0 or a1 of rows are off, each by its own, of those that an engine has that read the file."""
     if case.scene is None or "law" not in mine:

@@ -6,6 +6,7 @@ read before the steps, or behind them, shows next to none of that, and less than
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ STEP = 2e-8
 """Time that no step takes, s: a hundred cycles of a processor."""
 READ = 1e-6
 """What two readings of one clock are apart, s."""
+CORES, TICK = os.cpu_count() or 1, 0.02
+"""Processors, and the longest tick of a clock that tells their time, s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,11 +31,13 @@ class Clock:
         run: the run of an engine's own steps, whose time is the one that is reported.
         around_s: what passed around it, s.
         compiled_s: part of that in which code was compiled, s.
+        cpu_s: time of all processors in it, s, by which the cost of other runs is told; 0 where nobody looked.
     """
 
     run: Trajectory
     around_s: float
     compiled_s: float
+    cpu_s: float = 0.0
 
 
 def mistimed(clock: Clock, shown: Trajectory, took_s: float) -> Iterator[tuple[float, str]]:
@@ -51,6 +56,8 @@ def mistimed(clock: Clock, shown: Trajectory, took_s: float) -> Iterator[tuple[f
     least = max(PART * (clock.around_s - clock.compiled_s), STEP * own.steps)
     if 0.0 < own.wall_s < least:  # 0 is no time, of one's own engine
         yield own.wall_s, f"{clock.around_s:.3g} s passed around the run, which took {own.steps} steps."
+    if not 0.0 <= clock.cpu_s <= CORES * (clock.around_s + TICK):
+        yield clock.cpu_s, f"{CORES} processors had {clock.around_s:.3g} s each."
     if not 0.0 <= own.control_s <= own.wall_s:
         yield own.control_s, f"A controller took more than the whole run, {own.wall_s:.3g} s, or less than none."
     if not took_s >= clock.around_s - clock.compiled_s - READ:

@@ -5,12 +5,16 @@ it. Of steps a thousandth as long nothing is left, and what they do is known in 
 velocities change by v' dt, and theta of the change counts where a step moves bodies (`Engine.steps`). Where one pair
 meets at the speed w, within half a step of its touch, it parts at e w; and where it slips fast besides, |p_t| =
 mu p_n with M (v - v of the same steps where nothing touches) = H_n^T p_n + H_t^T p_t.
+
+What changes with time shows nothing within so few steps. So activations are made as fast as these: their law has no
+other constant of time, and what they do at every instant must be what a' = u or tau a' = u - a makes of controls that
+jump, from the instants of the steps on.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +24,9 @@ from numpy.typing import NDArray
 from crossbody import engines
 from crossbody.cases import Case, CrossbodyError, Inputs, Trajectory
 from crossbody.cases import closed_forms as cf
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.rotations import normalised
+from crossbody.cases.scene import UNBOUNDED
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts, watched
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.measuring.equations import equations
@@ -33,6 +38,15 @@ PART, OF_BLOWS = 1e-3, 1e-5
 """Parts of an engine's own step that are taken, where nothing touches and where a pair meets."""
 STEPS, BLOWS = 4, 8
 """How many."""
+FILTERS, DRIVEN = 0.5, 16
+"""Part of so few steps that is a filter's constant of time there, and into how many steps of their own they are cut
+first: an error of first order in them is taken out by twice as many."""
+JUMPS = (0.0, 0.25, 0.5, 0.75)
+"""Parts of that time at which controls jump."""
+OF_DRIVES = 0.05
+"""Part of what activations do by which they may be off: of second order in so many steps."""
+SHOWN, LIGHT = 1e-12, 1e-4
+"""Change of a velocity, SI, that rounding hides, and part of the largest one below which another is none."""
 CLEAR = 1e-3
 """Gap, m, of what does not touch: no motion of that time crosses it."""
 FAST, MEETS, SLIPS, FASTEST, PARTS = 0.5, 1.0, 30.0, 100.0, 0.5
@@ -126,11 +140,46 @@ class Probe:
 
     def stepped(self, q: Floats, v: Floats, part: float, count: int) -> Trajectory | None:
         """Return some steps from a state; None where they fail."""
-        given = {name: value for name, value in self.asked.items() if name != "max_steps"}
-        given |= {"dt": part * self.dt} if "dt" in self.used else {}
         case = self.begun(q, v, count * part * self.dt, jumps=1 + (part == PART))
-        run = self.engine.prepare(case, self.profile, **given).run()
+        run = self.engine.prepare(case, self.profile, **self.given(part * self.dt)).run()
         return run if run.outcome.ok else None
+
+    def given(self, dt: float) -> dict[str, Any]:
+        """Return the settings of a run that has another step, s."""
+        given = {name: value for name, value in self.asked.items() if name != "max_steps"}
+        return given | ({"dt": dt} if "dt" in self.used else {})
+
+    def activated(self, t_end: float, size: float, steps: int) -> Case:
+        """Return the case with activations that follow controls of a size, none for 0, within an instant, s.
+
+        Controls are given anew in every step of the first half, where they jump or not. Neither their ranges nor those
+        of forces end what they do.
+        """
+        case = self.case
+        assert case.scene is not None
+        drawn = np.random.default_rng(SEED)
+        start, inputs = size * drawn.uniform(-1.0, 1.0, len(case.act0)), case.scene.inputs
+        values = size * drawn.uniform(-1.0, 1.0, (len(JUMPS), len(inputs)))
+        given = distinct(np.arange(steps // 2) / steps, JUMPS)
+        values = values[np.searchsorted(JUMPS, given, side="right") - 1]
+        for i in (i for i in case.scene.activated if case.scene.actuators[i].activation == "integrator"):
+            values[:, i] /= t_end
+        return replace(
+            case, scene=case.scene.replace(actuators=tuple(
+                replace(one, control_range=UNBOUNDED, activation_range=UNBOUNDED, force_range=UNBOUNDED,
+                        time_constant=FILTERS * t_end if one.activation == "filter" else 0.0) if one.activation else one
+                for one in case.scene.actuators
+            )), act0=start, inputs=Inputs(names=inputs, times=t_end * given, values=values),
+            t_end=t_end, closed_form=None, claims=(), chaos=None, consistent=False,
+        )  # fmt: skip
+
+    def clear(self) -> Floats | None:
+        """Return positions near the start in which nothing touches; None if there are none to be told."""
+        gap = self.theirs["gap"]
+        q = self.placed(self.opening, np.maximum(gap(self.case.q0)[self.opening], 0.0) + CLEAR)
+        # rows that are always on are soft in engines, and take their time
+        unclear = len(self.held) or _has_more(self) or np.any(gap(q)[self.opening] <= 0.5 * CLEAR)
+        return None if unclear else q
 
     def begun(self, q: Floats, v: Floats, t_end: float, jumps: int = 2) -> Case:
         """Return the case from another state on, up to an instant, s, with inputs that jump, perhaps again amid."""
@@ -165,7 +214,7 @@ def first_steps(
     probe = Probe(case, *who, used, asked, theirs, system, same and "dt" in used and not math.isnan(theta))
     try:
         touching = () if case.file or who[1] in who[0].late else _blows(probe)
-        return (*(_free(probe) if probe.steps else ()), *touching)
+        return (*(_free(probe) if probe.steps else ()), *(_driven(probe) if probe.steps else ()), *touching)
     except (CrossbodyError, np.linalg.LinAlgError):  # a state that the engine or the reference refuses
         return ()
 
@@ -184,10 +233,9 @@ def _plain(case: Case) -> bool:
 
 def _free(probe: Probe) -> Iterator[AuditRow]:
     """Step where nothing touches and everything moves."""
-    gap, t_end = probe.theirs["gap"], PART * STEPS * probe.dt
-    q = probe.placed(probe.opening, np.maximum(gap(probe.case.q0)[probe.opening], 0.0) + CLEAR)
-    if len(probe.held) or _has_more(probe) or np.any(gap(q)[probe.opening] <= 0.5 * CLEAR):
-        return  # rows that are always on are soft in engines, and take their time
+    q, t_end = probe.clear(), PART * STEPS * probe.dt
+    if q is None:
+        return
     v = np.random.default_rng(SEED).uniform(-FAST, FAST, len(probe.case.v0))
     quarters = np.linspace(0.0, t_end, 5)
     exact = engines.load("reference").prepare(probe.begun(q, v, t_end), "compiled", samples=quarters).run()
@@ -202,6 +250,34 @@ def _free(probe: Probe) -> Iterator[AuditRow]:
     yield _row("acceleration", changed / t_end, wanted / t_end, float(np.max(np.abs(changed - wanted))) / size)
     if run is not None and size > 2.0 * least and math.isfinite(probe.engine.steps[probe.profile]):
         yield from _places(probe, run)
+
+
+def _driven(probe: Probe) -> Iterator[AuditRow]:
+    """Step while activations follow controls that jump, where nothing touches: what they do beside controls of none.
+
+    An engine that reads the file by itself has the file's constants.
+    """
+    case, q, t_end = probe.case, probe.clear(), PART * STEPS * probe.dt
+    own = probe.used.get("reader") == "file"
+    if own or not (case.general and case.scene is not None and case.scene.activated) or q is None:
+        return
+    still = np.zeros(len(case.v0))
+
+    def changed(run: Callable[[Case], Trajectory], steps: int = len(JUMPS)) -> Floats:
+        runs = [run(replace(probe.activated(t_end, size, steps), q0=q, v0=still)) for size in (1.0, 0.0)]
+        found: Floats = runs[0].v[-1] - runs[1].v[-1]
+        return found if all(one.outcome.ok for one in runs) else np.full(len(still), np.inf)
+
+    def stepped(steps: int) -> Floats:
+        given = probe.given(t_end / steps)
+        return changed(lambda one: probe.engine.prepare(one, probe.profile, **given).run(), steps)
+
+    wanted = changed(lambda one: engines.load("reference").prepare(one, "compiled").run())
+    size = float(np.max(np.abs(wanted)))
+    if SHOWN < size < np.inf:
+        found = 2.0 * stepped(2 * DRIVEN) - stepped(DRIVEN)
+        off = float(np.max(np.abs(found - wanted) / np.maximum(np.abs(wanted), LIGHT * size)))
+        yield _row("activations", found / t_end, wanted / t_end, off, OF_DRIVES)
 
 
 def _has_more(probe: Probe) -> bool:

@@ -53,7 +53,7 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
         )
 
     for name, value, (least, most), fault in (
-        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(),
+        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(file=bool(case.file)),
     ):  # fmt: skip
         if least <= value <= most:
             why = f"A control passes: {fault} is no number outside."

@@ -6,13 +6,17 @@ that runs and judges are made of, plug-ins, versions of libraries, and the proce
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
 from crossbody.cases import installed
+from crossbody.cases.errors import OwnFault
 from crossbody.cases.sources import readable
 from crossbody.reference import code_store
 from crossbody.reports.sources import SHOWN, code
@@ -20,47 +24,91 @@ from crossbody.reports.sources import SHOWN, code
 Found = tuple[str, float, tuple[float, float], str]
 KINDS = (
     "judging.known_answers", "judging.known_sides", "judging.known_sources", "judging.known_growth",
-    "judging.known_parts", "judging.known_steps", "judging.known_tables", "pages.known_pages",
+    "judging.known_parts", "judging.known_steps", "judging.known_tables", "judging.known_equations",
+    "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
+    "judging.known_verdicts",
 )  # fmt: skip
+OF_FILES = ("judging.known_files",)
+"""Of runs of files, beside: compilers take longer to import than all else that a short run does."""
+OF_COMMANDS = {
+    "replay": ("replay.known_replay",), "bench": ("bench.known_bench",), "analyse": ("analysis.known_analysis",),
+    "picture": ("pages.known_pictures",),
+}  # fmt: skip
+"""Of commands that judge no run: they ask before they say a number."""
+RUNS = "known_answers"
+"""Under which name it is kept that those of runs were right."""
 RIGHT = b"every known answer was right"
 
 once = False
 """Whether what was right is believed: where a command has a process of its own, so that nobody replaced functions."""
 
 
-def wrong() -> Iterator[Found]:
-    """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another."""
+def wrong(*, file: bool = False) -> Iterator[Found]:
+    """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another.
+
+    Those of readers of files are asked where a file is run.
+    """
+    yield from _once(RUNS, KINDS)
+    if file:
+        yield from _once(f"{RUNS}_files", OF_FILES)
+
+
+def check(command: str) -> None:
+    """Ask what a command says of made-up motions, logs and tables before it says anything else.
+
+    Raises:
+        OwnFault: with the first number that is another one than must be.
+    """
+    found = _once(f"{RUNS}_{command}", OF_COMMANDS[command])
+    for name, value, (least, most), what in found:
+        must = f"{least:.9g}" if least == most else f"between {least:.9g} and {most:.9g}"
+        more = f" {len(found) - 1} more numbers are wrong." if len(found) > 1 else ""
+        raise OwnFault(f"No number can be trusted: {name} of {what} is {value:.9g}, but must be {must}.{more}")
+
+
+def _once(kept: str, names: tuple[str, ...]) -> tuple[Found, ...]:
+    """Return what is wrong of some modules, asked once for each version of the code."""
     store = code_store.current() if once and readable() else None
-    name = "" if store is None else _name()
+    name = "" if store is None else _name(kept)
     if store is not None and store.has(name) and store.read(name) == RIGHT:
-        return
-    found = tuple(_asked())
+        return ()
+    found = tuple(_asked(names))
     if store is not None and not found:
         store.write(name, RIGHT)
-    yield from found
+    return found
 
 
-def _asked() -> Iterator[Found]:
+def _asked(names: tuple[str, ...] = KINDS) -> Iterator[Found]:
     """Ask all of them."""
-    for kind in kinds():
+    for kind in kinds(names):
         yield from kind.wrong()
 
 
-def kinds() -> tuple[ModuleType, ...]:
+def kinds(names: tuple[str, ...] = KINDS) -> tuple[ModuleType, ...]:
     """Return the modules that ask, each by its `wrong`: found by name, since pages import what is judged."""
-    return tuple(import_module(f"crossbody.reports.{name}") for name in KINDS)
+    return tuple(import_module(f"crossbody.reports.{name}") for name in names)
 
 
-def _name() -> str:
+def _templates() -> str:
+    """Return the digest of what pages are filled into, which is no Python."""
+    folder, found = Path(__file__).parents[1] / "pages" / "templates", hashlib.sha256()
+    for entry in sorted(os.scandir(folder), key=lambda one: one.name):
+        if entry.is_file() and not entry.name.endswith(".min.js"):
+            found.update(entry.name.encode() + Path(entry.path).read_bytes())
+    return found.hexdigest()
+
+
+def _name(kept: str = RUNS) -> str:
     """Return under which name it is kept that all were right: readable, then a digest of all that they depend on."""
     from crossbody.reference.cache import debugging, machine
 
     depends = (
         code(SHOWN),
+        _templates(),
         *machine(),
         np.__version__,
         installed.version("scipy"),
         str(debugging()),
         repr(sorted(installed.digests().items())),
     )
-    return code_store.named("known_answers", *depends)
+    return code_store.named(kept, *depends)

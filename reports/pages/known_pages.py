@@ -25,10 +25,11 @@ Found = tuple[str, float, Range, str]
 def wrong() -> tuple[Found, ...]:
     """Return figure, number as it is drawn, least and most, and which number, where another one is drawn."""
     kinds = (*known_figures.KINDS.items(), *known_playback.KINDS.items(), *known_texts.KINDS.items())
-    return tuple(found for name, ask in kinds for found in _wrong(name, ask))
+    return tuple(found for name, ask in kinds for found in asked(name, ask))
 
 
-def _wrong(name: str, ask: Callable[[], Iterator[Said]]) -> Iterator[Found]:
+def asked(name: str, ask: Callable[[], Iterator[Said]]) -> Iterator[Found]:
+    """Yield what a figure draws that is another number than it must be."""
     try:
         for what, drawn, wanted in ask():
             if (differs := _differs(drawn, wanted)) is not None:

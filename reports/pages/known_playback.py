@@ -11,8 +11,9 @@ import numpy as np
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats
-from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
+from crossbody.cases.scene import Body, Joint, Loop, Pair, Scene, Shape
 from crossbody.cases.scene_plain import plain
+from crossbody.reports import scenes
 from crossbody.reports.figures.styles import look
 from crossbody.reports.pages import friction, playback
 from crossbody.reports.pages.known_figures import drawn
@@ -153,7 +154,71 @@ def _sides() -> Iterator[Said]:
     yield "loops of rows that are always on", float(len(friction.hysteresis(traces))), 0.0
 
 
+R, SLANT = 0.3, (0.8, 0.36, 0.48, 0.0)
+"""Radius of a ball, m, and a quaternion."""
+CORNERS = ((0.1, 0.2, -0.3), (-0.2, 0.1, -0.1), (0.1, -0.3, -0.2), (0.0, 0.1, 0.4))
+
+
+def _met() -> Scene:
+    """Return balls and a hull over a floor, a link with bounds on both sides, and a loop: rows of every kind."""
+    even, at = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    rubs: Any = {"dimension": 3, "friction": (MU, MU, 0.0, 0.0, 0.0)}
+    return Scene(
+        bodies=tuple(Body(name=name, mass=1.0, inertia=even) for name in ("one", "two", "hull", "link")),
+        joints=(*(Joint(name=name, body=name, type="free") for name in ("one", "two", "hull")),
+                Joint(name="turn", body="link", type="hinge", range=(-2.0, 2.0))),
+        shapes=(Shape(name="floor", type="plane", size=(1.0, 1.0, 1.0)),
+                *(Shape(name=name, body=name, size=(R, 0.0, 0.0)) for name in ("one", "two")),
+                Shape(name="hull", body="hull", type="hull", size=at, corners=CORNERS)),
+        pairs=(Pair(name="a", first="floor", second="one", **rubs), Pair(name="b", first="one", second="two"),
+               Pair(name="c", first="floor", second="hull")),
+        loops=(Loop(name="loop", type="connect", first="link", second="one", first_position=(0.5, 0.1, 0.0)),),
+    )  # fmt: skip
+
+
+def _rows() -> Iterator[Said]:
+    """Yield where arrows of a scene stand and the force of which row each carries, one row after another."""
+    draw, n = np.random.default_rng(5), 3
+    one, two, hull = draw.normal(size=(3, n, 3)) + np.array([0.0, 0.0, 3.0])
+    turn, upright = draw.normal(size=(n, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+    slant = np.tile(SLANT, (n, 1))
+    q = np.concatenate([one, upright, two, slant, hull, slant, turn], axis=1)
+    lam, up = draw.uniform(1.0, 9.0, (n, 3 + 2 + 2 + len(CORNERS) + 2)), np.array([0.0, 0.0, 1.0])
+    w, x, y, z = SLANT
+    turned = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                       [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                       [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])  # fmt: skip
+    c, s = np.cos(turn), np.sin(turn)
+    apart = (two - one) / np.sqrt(((two - one) ** 2).sum(axis=1, keepdims=True))
+    corners, bears = hull[:, None, :] + np.array(CORNERS) @ turned.T, lam[:, 7:11, None]
+    wanted = {
+        "a loop": (np.concatenate([0.5 * c - 0.1 * s, 0.5 * s + 0.1 * c, 0.0 * c], axis=1), lam[:, :3]),
+        "a ball on the floor": (one - R * up, lam[:, 5:6] * up), "two balls": (two - R * apart, lam[:, 6:7] * apart),
+        "a hull": ((bears * corners).sum(axis=1) / bears.sum(axis=1), bears.sum(axis=1) * up),
+    }  # fmt: skip
+    own: Any = {"scene": plain(_met())}
+    drawn, posed = scenes.load("scene").arrows(q, lam, own), scenes.load("scene").poses(q, own)
+    axes = {"one": np.eye(3), "two": turned, "hull": turned}
+    for k, (name, origin) in enumerate(zip(axes, (one, two, hull), strict=True)):
+        pose = np.concatenate([origin, np.tile(axes[name].T[:2].ravel(), (n, 1))], axis=1)
+        yield f"pose of the body {name}", posed[:, k], pose
+    yield "pose of a link", posed[:, 3], np.concatenate([0 * q[:, :3], c, s, 0 * c, -s, c, 0 * c], axis=1)
+    yield "number of arrows", drawn.shape[1], len(wanted)
+    for k, (what, (at, force)) in enumerate(wanted.items()):
+        yield f"place of {what}", drawn[:, k, :3], at
+        yield f"force on {what}", drawn[:, k, 3:], force
+
+
+def _pairs_of_balls() -> Iterator[Said]:
+    """Yield both arrows of each pair of balls in a row."""
+    x, lam, r = np.array([[0.0, 1.0, 3.0]]), np.array([[2.0, 5.0]]), 0.25
+    centres = np.stack([x, np.zeros_like(x)], axis=2)
+    left, right = ([[x + side * r, 0.0, -side * f, 0.0] for x, f in zip(at, (2.0, 5.0), strict=True)]
+                   for at, side in (((0.0, 1.0), 1.0), ((1.0, 3.0), -1.0)))  # fmt: skip
+    yield "both arrows of balls in a row", scenes.pushes(centres, lam, r), [*left, *right]
+
+
 KINDS = {
-    "playback": _playback, "loops of force": _loops, "friction figures": _friction, "loops": _sides,
-    "loops off scale": _far,
+    "arrows of rows": _rows, "arrows of balls": _pairs_of_balls, "playback": _playback, "loops of force": _loops,
+    "friction figures": _friction, "loops": _sides, "loops off scale": _far,
 }  # fmt: skip

@@ -17,7 +17,7 @@ from crossbody.cases.errors import OwnFault
 from crossbody.cases.public_names import TEXT, Public, check_values
 from crossbody.reference import ahead
 from crossbody.reference.compiling import count
-from crossbody.reports.judging.audit import AuditRow, answered_once, audit
+from crossbody.reports.judging.audit import AuditRow, answered_once, audit, settings_kept
 from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.comparison import check_names, judges_parts
 from crossbody.reports.judging.covered import covered
@@ -25,6 +25,7 @@ from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.parts import RATIO, Study
 from crossbody.reports.judging.reach import BUDGET, estimated, followed
 from crossbody.reports.judging.run_verdicts import Entry, crash
+from crossbody.reports.judging.start_of_file import start_of_file
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
@@ -195,6 +196,7 @@ def _ran(
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     own = {name: value for name, value in asked.items() if name in prepared.settings}
+    rows += (*settings_kept(shown, prepared.settings), *start_of_file(case))
     rows += first_steps(case, (engines.load(pick.engine), prepared.profile), prepared.settings, own, rows, reference)
     began, clock, compiled = process_time(), perf_counter(), count.seconds
     made = prepared.run()
@@ -211,7 +213,7 @@ def _ran(
         settings=prepared.settings,
         default=not any(name in prepared.settings for name in asked),
         run=run,
-        clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled),
+        clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled, cpu_s=took),
         audit=rows,
         study=_study(case, pick, prepared, natural, run, took, OF_STUDIES * budget) if studied else None,
         hidden=hidden,

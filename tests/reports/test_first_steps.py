@@ -15,6 +15,7 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases import closed_forms as cf
 from crossbody.engines import Engine, Run
 from crossbody.engines._acting import Acting
+from crossbody.engines._scene import Forces
 from crossbody.reports.judging import first_steps as first_steps_of
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.first_steps import _of_law, first_steps
@@ -210,3 +211,32 @@ def test_a_file_falls_as_fast_as_its_law_has_it(who: str, spared: float, tmp_pat
     assert f"{-9.81 * (1.0 - spared):.6g}" in right.mine.split()
     wrong = told(str(path), who, faster, friction=1)
     assert not wrong["acceleration"].ok
+
+
+BOX = Path(__file__).parents[1] / "support" / "driven_box.xml"
+
+
+@pytest.mark.parametrize("who", ["dart:matched", "pinocchio:admm"])
+def test_activations_that_follow_another_clock_are_told(who: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that stands still between changes, and one that is a step late at each of them."""
+    right = told(str(BOX), who, friction=1)["activations"]
+    assert right.ok
+    assert right.difference < 0.01  # of second order in 16 steps
+    change, driven = Forces.change, Forces.driven
+
+    def late(forces: Forces, values: Any, t: float) -> None:
+        change(forces, values, forces.t)
+        forces.t = forces.since = t
+
+    def still(forces: Forces) -> Any:
+        forces.t = forces.since
+        return driven(forces)
+
+    for name, other in (("change", late), ("driven", still)):
+        with monkeypatch.context() as changed:
+            changed.setattr(Forces, name, other)
+            assert not told(str(BOX), who, friction=1)["activations"].ok
+
+
+def test_activations_of_a_file_that_the_engine_reads_by_itself_are_not_asked() -> None:
+    assert "activations" not in told(str(BOX), "mujoco:as_is", friction=1)

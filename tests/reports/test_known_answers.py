@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,6 +17,7 @@ from crossbody.cases import Trajectory
 from crossbody.reports.judging import (
     judge_controls,
     known,
+    known_files,
     known_growth,
     known_parts,
     known_sides,
@@ -44,7 +46,8 @@ from crossbody.reports.pages import (
 )
 from crossbody.reports.pages.made_up_traces import Drawn
 
-KNOWN = known.kinds()
+BOX = Path(__file__).parents[1] / "support" / "driven_box.xml"
+KNOWN = (*known.kinds(), *known.kinds(known.OF_FILES))
 
 
 @pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
@@ -55,7 +58,8 @@ def test_what_is_right_is_not_told(module: Any) -> None:
 @pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
 def test_what_is_wrong_is_a_row_of_every_run(module: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "wrong", lambda: (("position", 1.0, (2.0, 2.0), "a motion"),))
-    case = cases.load("bouncing_ball", "elastic")
+    of_file = module is known_files  # asked where a file is run
+    case = cases.load(str(BOX), "two", t_end=0.02) if of_file else cases.load("bouncing_ball", "elastic")
     rows = judge_controls.blind(case, shortened(truth_of(case)), "")
     assert [(row.metric, row.verdict) for row in rows] == [("position (control)", "outside")]
 

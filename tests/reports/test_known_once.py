@@ -20,7 +20,7 @@ from crossbody.reports.runs import watch
 ASK = """
 from crossbody.reports.judging import known
 asked, known.once = known._asked, True
-known._asked = lambda: (print("asked"), *asked())[1:]
+known._asked = lambda names: (print("asked"), *asked(names))[1:]
 print(len(list(known.wrong())), "wrong")
 """
 METRIC = "reports/metrics/position.py"
@@ -80,7 +80,7 @@ def test_what_is_kept_is_not_believed_where_it_was_damaged(monkeypatch: pytest.M
     monkeypatch.setenv("CROSSBODY_CACHE", str(tmp_path))
     monkeypatch.setattr(known, "once", True)
     asked: list[int] = []
-    monkeypatch.setattr(known, "_asked", lambda: iter(asked.append(1) or ()))
+    monkeypatch.setattr(known, "_asked", lambda _: iter(asked.append(1) or ()))
     assert [list(known.wrong()) for _ in range(3)] == [[], [], []]
     assert len(asked) == 1
     (path,) = (tmp_path / "compiled").glob("known_answers-*")
@@ -101,7 +101,7 @@ def test_another_library_processor_or_plugin_is_asked_again(monkeypatch: pytest.
 def test_a_process_that_others_share_asks_every_time(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not watch.alone()
     asked: list[int] = []
-    monkeypatch.setattr(known, "_asked", lambda: iter(asked.append(1) or ()))
+    monkeypatch.setattr(known, "_asked", lambda _: iter(asked.append(1) or ()))
     assert [*known.wrong(), *known.wrong()] == []
     assert len(asked) == 2
 

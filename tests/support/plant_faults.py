@@ -6,10 +6,10 @@
     python tests/support/plant_faults.py --faults mine.toml  those of a list of one's own, written as faults.toml is
 
 A fault is a change of the text of one file. It is seen by `run` if `crossbody run` with those arguments says that a
-number is outside (exit code 1), and by `test`, which is asked where `run` sees nothing, if pytest fails there. What
-sees a fault must pass on the sources as they are: it is asked once without any. What was seen is kept in `--kept`, by
-a digest of all sources, so that a run that was interrupted goes on; the exit code is 1 if fewer were seen than
-`RUN_SEES` and `ALL_SEE` ask for.
+number is outside (exit code 1), by `command` if another command ends otherwise than with 0, and by `test`, which is
+asked where these see nothing, if pytest fails there. What sees a fault must pass on the sources as they are: it is
+asked once without any. What was seen is kept in `--kept`, by a digest of all sources, so that a run that was
+interrupted goes on; the exit code is 1 if fewer were seen than `RUN_SEES` and `ALL_SEE` ask for.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ FAULTS = ROOT / "tests" / "faults.toml"
 FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 RUN_SEES, ALL_SEE = 7 / 8, 39 / 40
 LIMIT_S = 1800.0
+BEGIN = ("-c", "from crossbody.reports.entry import main; main()")
 FAILED, NO_TEST = 1, 5
 """Exit codes: of `crossbody run` and of pytest where something is wrong with what they looked at; of pytest where
 its arguments select nothing."""
@@ -52,6 +53,7 @@ class Fault:
         file: of the sources.
         old, new: the text that stands there once, and what is put in its place.
         run: arguments of `crossbody run`; empty where only a test can see it.
+        command: arguments of `crossbody`, of a command that judges no run; empty where there is none.
         test: arguments of pytest; empty where `run` sees it.
         quick: whether it is one of the sample of the gate.
     """
@@ -61,13 +63,15 @@ class Fault:
     old: str
     new: str
     run: str = ""
+    command: str = ""
     test: str = ""
     quick: bool = False
 
     @property
     def checks(self) -> tuple[tuple[str, str], ...]:
-        """("run" or "test", arguments) of each that is named."""
-        return tuple((kind, said) for kind, said in (("run", self.run), ("test", self.test)) if said)
+        """("run", "command" or "test", arguments) of each that is named."""
+        kinds = (("run", self.run), ("command", self.command), ("test", self.test))
+        return tuple((kind, said) for kind, said in kinds if said)
 
 
 def faults(table: Path = FAULTS) -> tuple[Fault, ...]:
@@ -113,17 +117,14 @@ class Tree:
             path.write_text(whole, encoding="utf-8")
 
     def fails(self, kind: str, arguments: str) -> bool:
-        """Whether `run` or `test` says that something is wrong.
+        """Whether `run`, a command or `test` says that something is wrong.
 
         Raises:
             ValueError: where it ends in another way than by passing or failing.
             NoTestError: where no test is selected, with whatever fault.
         """
         start = {
-            "run": [
-                "-c", "from crossbody.reports.entry import main; main()",
-                "run", "-q", "--out", str(self.root / "out"),
-            ],
+            "run": [*BEGIN, "run", "-q", "--out", str(self.root / "out")], "command": BEGIN,
             "test": ["-m", "pytest", "-q", "-x", "-p", "no:cacheprovider"],
         }[kind]  # fmt: skip
         shutil.rmtree(self.root / "out", ignore_errors=True)
@@ -134,6 +135,8 @@ class Tree:
         )  # fmt: skip
         if kind == "test" and ended.returncode == NO_TEST:
             raise NoTestError(f"pytest {arguments} selects no test.")
+        if kind == "command":
+            return ended.returncode != 0
         if ended.returncode not in (0, FAILED):
             said = (ended.stdout + ended.stderr)[-2000:]
             raise ValueError(f"{kind} {arguments} ended with exit code {ended.returncode}:\n{said}")

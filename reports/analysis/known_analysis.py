@@ -1,0 +1,205 @@
+"""What an analysis must say of linear models in closed form, and of a weight on a spring.
+
+A mass m on a spring k with a damper c, pushed by a motor, has the poles of s^2 + (c/m) s + k/m and the response
+
+    1 / (k - m w^2 + i c w)
+
+from its force to its place, and hangs by m g / k below where the spring rests. So matrices, poles, ranks, responses,
+loci, and what is said of an engine's own linear model, have answers that are written out here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from crossbody.cases.arrays import Floats
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Actuator, Body, Joint, Scene
+from crossbody.engines.linear import Tangent
+from crossbody.reference.linear import LinearModel
+from crossbody.reports.analysis import bode, numbers
+from crossbody.reports.analysis.counterparts import compared
+from crossbody.reports.analysis.loci import limits, root_locus
+from crossbody.reports.analysis.places import Place, places
+from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.verdict import Word
+
+MASS, SPRING, DRAG, GRAVITY, GEAR = 1.5, 60.0, 3.0, 9.81, 0.7
+"""Of a weight on a spring, SI."""
+EXACT, SOLVED = 1e-9, 1e-7
+"""Part of a number by which sums in another order differ, and to which equations are solved and differentiated."""
+OMEGA = np.array([0.1, 3.0, 6.2, 6.5, 40.0, 900.0])
+Found = tuple[str, float, Range, str]
+Asked = tuple[str, str, float, float]
+
+
+@cache
+def wrong() -> tuple[Found, ...]:
+    """Return which number, as it is, least and most, and of what, where it is another one."""
+    found: list[Found] = []
+    for kind in (_weight, _responses, _ranks, _poles, _loci, _curves, _engines):
+        try:
+            asked = list(kind())
+        except Exception as error:  # what ends so says no number
+            asked = [("analysis", f"a model that ends in {type(error).__name__}: {error}", math.nan, 0.0)]
+        found += [
+            (name, value, (wanted, wanted), what)
+            for name, what, value, wanted in asked if not abs(value - wanted) <= SOLVED * max(abs(wanted), 1e-3)
+        ]  # fmt: skip
+    return tuple(found)
+
+
+def _rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
+    return table.to_dict(orient="records")
+
+
+@cache
+def _hanging() -> Place:
+    """Return the equilibrium of the weight."""
+    made = Scene(
+        bodies=(Body(name="weight", mass=MASS, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),),
+        joints=(Joint(name="z", body="weight", type="slide", stiffness=(SPRING, 0.0, 0.0), damping=(DRAG, 0.0, 0.0)),),
+        actuators=(Actuator(name="motor", joint="z", gear=(GEAR,)),), gravity=(0.0, 0.0, -GRAVITY),
+    )  # fmt: skip
+    (place,) = places(case_of(made, name="made_up", q0=[-MASS * GRAVITY / SPRING], t_end=0.01))
+    return place
+
+
+def _weight() -> Iterator[Asked]:
+    """Yield where the weight hangs, the matrices there, and its poles."""
+    place = _hanging()
+    rows = {row["variable"]: row["value"] for row in _rows(numbers.equilibria([place], place.case))}
+    yield "equilibrium", "a weight on a spring", rows["z"], -MASS * GRAVITY / SPRING
+    full = place.linearised(reduce=False)
+    wanted = {"A": [[0.0, 1.0], [-SPRING / MASS, -DRAG / MASS]], "B": [[0.0], [GEAR / MASS]]}
+    for name, matrix in wanted.items():
+        for one, must in zip(np.ravel(getattr(full, name)).tolist(), np.ravel(matrix).tolist(), strict=True):
+            yield name, "a weight on a spring", one, must
+    decay, size = DRAG / (2.0 * MASS), math.sqrt(SPRING / MASS)
+    for row, sign in zip(_rows(numbers.poles([place])), (1.0, -1.0), strict=True):
+        told = {
+            "real": -decay,
+            "imag": sign * math.sqrt(size**2 - decay**2),
+            "frequency": size,
+            "damping": decay / size,
+        }
+        for name, must in told.items():
+            yield name, "a weight on a spring", row[name], must
+
+
+def _model(damping: float = DRAG / MASS, stiffness: float = SPRING / MASS) -> LinearModel:
+    return LinearModel(
+        A=np.array([[0.0, 1.0], [-stiffness, -damping]]), B=np.array([[0.0], [1.0]]), C=np.eye(2),
+        D=np.array([[0.0], [0.25]]), states=("x", "x'"), inputs=("f",), outputs=("x", "x'"),
+    )  # fmt: skip
+
+
+def _place(model: LinearModel, name: str = "made up") -> Any:
+    return SimpleNamespace(name=name, model=model, why="", controlled=False)
+
+
+def _closed(w: Floats) -> tuple[Any, Any]:
+    """Return the responses of place and speed, the latter with what passes by."""
+    x = 1.0 / (SPRING / MASS - w**2 + 1j * DRAG / MASS * w)
+    return x, 1j * w * x + 0.25
+
+
+def _responses() -> Iterator[Asked]:
+    rows = numbers.responses([_place(_model())], OMEGA)
+    for output, wanted in zip(("x", "x'"), _closed(OMEGA), strict=True):
+        own = rows[rows["output"] == output]
+        phase = np.degrees(np.unwrap(np.angle(wanted)))
+        for k, w in enumerate(OMEGA):
+            yield "magnitude", f"{output} at {w:g} rad/s", float(own["magnitude"].iloc[k]), float(abs(wanted[k]))
+            yield "phase", f"{output} at {w:g} rad/s", float(own["phase"].iloc[k]), float(phase[k])
+            yield "omega", f"{output} at {w:g} rad/s", float(own["omega"].iloc[k]), float(w)
+
+
+def _ranks() -> Iterator[Asked]:
+    """Yield ranks of a model of which one state is not reached, and two are not shown."""
+    model = LinearModel(
+        A=np.diag([-1.0, -2.0, -0.5]), B=np.array([[1.0], [1.0], [0.0]]), C=np.array([[1.0, 0.0, 0.0]]),
+        D=np.zeros((1, 1)), states=("a", "b", "c"), inputs=("u",), outputs=("y",),
+    )  # fmt: skip
+    (row,) = _rows(numbers.ranks([_place(model)]))
+    told = {"states": 3.0, "controllable": 2.0, "observable": 1.0, "growth": -0.5}
+    for name, must in told.items():
+        yield name, "a diagonal model", float(row[name]), must
+    led = numbers.poles([_place(model)])["led_by"].tolist()
+    yield "led_by", "a diagonal model", float(led == ["c", "a", "b"]), 1.0
+
+
+def _poles() -> Iterator[Asked]:
+    """Yield poles of a mode set, and the largest real part without the two nearest to 0."""
+    model = LinearModel(
+        A=np.diag([1e-9, -1e-8, -3.0, -0.2]), B=np.zeros((4, 1)), C=np.zeros((1, 4)), D=np.zeros((1, 1)),
+        states=tuple("abcd"), inputs=("u",), outputs=("y",),
+    )  # fmt: skip
+    found = bode.poles([bode.Curve(mode="grasp", kstar=5.0, model=model)])
+    yield "poles", "a diagonal model", float(len(found)), 4.0
+    yield "growth", "a diagonal model with two poles at rest", float(bode.growths(found)["growth"].iloc[0]), -0.2
+
+
+@dataclass
+class _Family:
+    """Models whose damping is 0.8 less the parameter: they lose their stability there."""
+
+    parameter: str = "gain"
+
+    def places(self, value: float) -> tuple[Any, ...]:
+        """Return one place."""
+        return (_place(_model(damping=0.8 - value, stiffness=9.0)),)
+
+    def model(self, _k: int, value: float) -> LinearModel:
+        """Return its model."""
+        found: LinearModel = self.places(value)[0].model
+        return found
+
+
+def _loci() -> Iterator[Asked]:
+    values = np.linspace(0.0, 2.0, 6).tolist()
+    family: Any = _Family()
+    (row,) = _rows(limits(family, values))
+    yield "limit", "a damping that a gain takes away", row["value"], 0.8
+    yield "frequency", "a damping that a gain takes away", row["frequency"], 3.0
+    yield "unstable", "a damping that a gain takes away", float(row["unstable"] == "above"), 1.0
+    for one in _rows(root_locus(family, values)):
+        half = 0.5 * (0.8 - one["value"])
+        yield "real", f"a branch at {one['value']:g}", one["real"], -half
+        yield "imag", f"a branch at {one['value']:g}", abs(one["imag"]), math.sqrt(9.0 - half**2)
+
+
+def _curves() -> Iterator[Asked]:
+    """Yield magnitudes and phases of the curves of a figure, of both outputs in their order."""
+    rows = bode.table([bode.Curve(mode="grasp", kstar=5.0, model=_model())], OMEGA)
+    for output, wanted in zip(bode.OUTPUTS, _closed(OMEGA), strict=True):
+        own, phase = rows[rows["output"] == output], np.degrees(np.unwrap(np.angle(wanted)))
+        for k, w in enumerate(OMEGA):
+            yield "magnitude", f"{output} at {w:g} rad/s", float(own["magnitude"].iloc[k]), float(abs(wanted[k]))
+            yield "phase", f"{output} at {w:g} rad/s", float(own["phase"].iloc[k]), float(phase[k])
+
+
+def _engines() -> Iterator[Asked]:
+    """Yield what is said of an engine whose slope is right, and of one whose stiffness is off by parts."""
+    place = _hanging()
+    right = np.array([[-SPRING / MASS, -DRAG / MASS]])
+    for off, known, word in ((0.0, False, Word.WITHIN), (1e-3, False, Word.OUTSIDE), (1e-3, True, Word.EXPECTED)):
+        slope = right * np.array([[1.0 + off, 1.0]])
+        way = Tangent(way="made up", slope=slope, known="a cause" if known else "", explained=slope if known else None)
+        row, pairs = compared(place, way)
+        told = f"a stiffness {off:g} off"
+        yield "slope", told, row["slope"], off
+        yield "verdict", told, float(row["verdict"] == word.value), 1.0
+        size = math.sqrt(SPRING / MASS)
+        decay = DRAG / (2.0 * MASS)
+        for pair, sign in zip(sorted(pairs, key=lambda one: -one["imag"]), (1.0, -1.0), strict=True):
+            yield "reference_imag", told, pair["reference_imag"], sign * math.sqrt(size**2 - decay**2)
+            yield "imag", told, pair["imag"], sign * math.sqrt(size**2 * (1.0 + off) - decay**2)

@@ -1,0 +1,97 @@
+"""What the sentence of a verdict must name, of made-up rows: the largest deviation, and what is farthest out.
+
+A sentence that is true of a lesser deviation hides the largest. So runs are drawn whose numbers all differ in size,
+some of them above what is claimed and some below, and the one that must be named is found here by its size alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import cache
+
+import numpy as np
+
+from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.told import runs_of, sentence
+from crossbody.reports.judging.verdict import Row, Verdict, Word
+
+DRAWS, SEED, LIMIT = 12, 31, 0.01
+METRICS = ("position", "velocity", "energy_drift", "balls_out", "gap_residual")
+"""Of which the first is told before all others, and the last two are no quantities of a motion."""
+QUANTITIES, NAMED = 3, 3
+"""How many of these are, and how many runs are named."""
+Found = tuple[str, float, Range, str]
+KINDS = ("largest deviation", "off", "beyond a limit")
+WORDS = (Word.EXPECTED, Word.OUTSIDE, Word.INFO)
+
+
+@cache
+def wrong() -> tuple[Found, ...]:
+    """Return what is said, number, least and most, and of what, where another number is named than must be."""
+    return tuple(("verdict sentence", math.nan, (value, value), f"made-up rows: {what}") for value, what in _unnamed())
+
+
+def _unnamed() -> Iterator[tuple[float, str]]:
+    """Yield a number that must be named and is not, and what it is."""
+    draw = np.random.default_rng(SEED)
+    for _ in range(DRAWS):
+        for kind, word in zip(KINDS, WORDS, strict=True):
+            rows = _rows(draw, word)
+            said = sentence(runs_of(rows))
+            wanted = _first(rows) if word is Word.EXPECTED else _named(rows, word)
+            places = [said.find(_words(row)) for row in wanted]
+            for row, place in zip(wanted, places, strict=True):
+                if place < 0 or places != sorted(places):
+                    yield row["value"], f"{kind}, {_words(row)}"
+
+
+def _rows(draw: np.random.Generator, word: Word) -> list[Row]:
+    """Return rows of some engines beyond their limits, and one of each within."""
+    found = []
+    for engine in ("e0", "e1", "e2", "e3"):
+        for metric in draw.permutation(METRICS[int(draw.integers(2)) :]).tolist():
+            expected = float(draw.choice([math.nan, 3.0])) if metric == "balls_out" else math.nan
+            off = draw.choice([-1.0, 1.0]) * LIMIT * 10.0 ** draw.uniform(0.5, 4.0)
+            found.append(_row(engine, metric, word, off + (0.0 if math.isnan(expected) else expected), expected))
+        found.append(_row(engine, "start_error", Word.WITHIN, 0.0, math.nan))
+    return [row.row() for row in found]
+
+
+def _row(engine: str, metric: str, word: Word, value: float, expected: float) -> Verdict:
+    return Verdict(
+        case="made_up", variant="a", engine=engine, profile="p", metric=metric, value=value, expected=expected,
+        unit="1", limit=LIMIT, tier="", verdict=word, why="A cause, which is known.",
+    )  # fmt: skip
+
+
+def _times(row: Row) -> float:
+    """Return how many times its limit a number is from what is claimed of it."""
+    expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
+    return float(abs(row["value"] - expected) / row["limit"])
+
+
+def _telling(row: Row) -> tuple[bool, bool, float]:
+    return row["metric"] != METRICS[0], row["metric"] not in METRICS[:QUANTITIES], -_times(row)
+
+
+def _first(rows: Sequence[Row]) -> list[Row]:
+    """Return the row that tells most: of position, else of another quantity, else of all; the largest of these."""
+    return sorted((row for row in rows if row["verdict"] == Word.EXPECTED), key=_telling)[:1]
+
+
+def _named(rows: Sequence[Row], word: Word) -> list[Row]:
+    """Return what is named of the runs that are farthest out: of each its farthest number, or its most telling one."""
+    own = [
+        min((row for row in run.rows if row["verdict"] == word), key=_telling if word is Word.INFO else _nearest)
+        for run in runs_of(rows)
+    ]
+    return sorted(own, key=_nearest)[:NAMED]
+
+
+def _nearest(row: Row) -> float:
+    return -_times(row)
+
+
+def _words(row: Row) -> str:
+    return f"{row['engine']}:p on made_up:a ({row['metric']} {row['value']:.2g}, {_times(row):.2g} times its limit"

@@ -1,0 +1,280 @@
+"""What replays and identifications must say of logs whose motion has a closed form, written out here.
+
+A link that turns about its end without weight, J th'' = tau - k th', moves by exponentials between changes of its
+torque. Its log is written as a rig would write it, in units, signs and offsets of its own and with times that do not
+begin at zero, read by a column map, replayed, and its parameters identified. A ball in flight whose height is recorded
+late is ahead of its record by a known way. So all that stands between a file and a number has an answer.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crossbody import hw
+from crossbody.cases import Outcome
+from crossbody.cases.arrays import Floats
+from crossbody.hw import Comparison, Log
+from crossbody.hw.reading.columns import parse_columns
+from crossbody.hw.reading.stream import Rows, join
+from crossbody.hw.replaying import measures
+from crossbody.hw.windows.whiteness import noise_level
+from crossbody.reports.judging.planted import Range
+
+Found = tuple[str, float, Range, str]
+Asked = tuple[str, str, float, float, float]
+"""Of what, which number, as it is, as it must be, and by how much it may be off."""
+EXACT, CLOSE = 1e-9, 1e-6
+"""By which part sums in another order differ; and what an integrator at its tolerance, and a search, leave."""
+INERTIA, MASS, REACH, DRAG, STEP, SAMPLES = 2e-3, 0.2, 0.15, 4e-3, 0.01, 240
+"""Of the link: kg m^2, kg, m, N m s; of its log: s."""
+BEGINS, COUNTS, ZERO, LATE = 12.5, 4000.0, 30.0, 0.023
+"""Its first time, s; counts of an encoder a turn; its angle at zero counts, degrees; and by how much it is late, s."""
+NOISE, ALIKE = 2e-4, 0.15
+"""Of angles, rad; and to which part a deviation is known by so many samples."""
+TORQUES, HELD, ANGLE, RATE = (0.02, -0.03, 0.01), 0.8, 0.4, -1.5
+"""Torques, N m, each for so long, s; and angle and rate at first, rad and rad/s."""
+LINK = """
+[time]
+column = "clock"
+unit = "ms"
+sample_time = 0.01
+[coordinates.th1]
+column = "encoder"
+unit = "deg"
+scale = 0.09
+offset = -30.0
+sign = -1
+[inputs."torque 1"]
+column = "drive"
+unit = "mN m"
+"""
+G, HEIGHT, SPEED, DELAY, FLIES, WINDOW = 9.81, 3.0, 4.0, 0.004, 0.64, 0.32
+"""Of the ball: m/s^2, m, m/s; how late its height is, and how long it flies and windows are, s."""
+BALL = """
+[time]
+column = "t"
+unit = "s"
+sample_time = 0.01
+[coordinates.height]
+column = "h"
+unit = "mm"
+delay = 0.004
+"""
+TICK, STEP_TICKS = 2.5e-5, 400
+"""Length of a tick of a clock, s, and how many of them are between samples."""
+TICKS = "clock,h,temperature,speed\n1000,1,20,0\n1400,2,20.5,60\n1800,3,21,120\n"
+COUNTED = """
+[time]
+column = "clock"
+unit = "ms"
+scale = 0.025
+[coordinates.height]
+column = "h"
+unit = "mm"
+[sensors.warmth]
+column = "temperature"
+unit = "degC"
+[sensors.turns]
+column = "speed"
+unit = "rpm"
+"""
+WALL = 0.5
+"""Time that a prediction is told to have taken, s."""
+
+
+@cache
+def wrong() -> tuple[Found, ...]:
+    """Return what, number, least and most, and of which log, where it is another one."""
+    found: list[Found] = []
+    for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces):
+        try:
+            asked = list(kind())
+        except Exception as error:  # what ends so says no number
+            asked = [("log", f"a log that ends in {type(error).__name__}: {error}", math.nan, 0.0, 0.0)]
+        found += [
+            (name, value, (wanted - within, wanted + within), what)
+            for name, what, value, wanted, within in asked if not abs(value - wanted) <= within
+        ]  # fmt: skip
+    return tuple(found)
+
+
+def _turned(t: Floats, inertia: float = INERTIA) -> Floats:
+    """Return the angles of a link (n,), rad, at instants t of its log, s: the sum of its answers to each change."""
+    J, before = inertia + MASS * REACH**2, 0.0
+    found: Floats = ANGLE + RATE * (J / DRAG) * (1.0 - np.exp(-DRAG / J * t))
+    for k, torque in enumerate(TORQUES):
+        gone = np.maximum(t - k * HELD, 0.0 if k else -np.inf)
+        found += (torque - before) / DRAG * (gone - (J / DRAG) * (1.0 - np.exp(-DRAG / J * gone)))
+        before = torque
+    return found
+
+
+def _torque(t: Floats) -> Floats:
+    found: Floats = np.array(TORQUES)[np.minimum((t / HELD + EXACT).astype(int), len(TORQUES) - 1)]
+    return found
+
+
+def _read(text: str, columns: str) -> Log:
+    """Return a log that was written as text."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        path.write_text(text, encoding="utf-8")
+        return hw.read(path, parse_columns(columns))
+
+
+@cache
+def _link_log(late: float = 0.0, noise: float = 0.0) -> Log:
+    t = STEP * np.arange(SAMPLES, dtype=np.float64)
+    angles = _turned(t - late) + noise * np.random.default_rng(5).normal(size=SAMPLES)
+    counts = (-np.degrees(angles) + ZERO) * COUNTS / 360.0
+    rows = zip((1e3 * (BEGINS + t)).tolist(), counts.tolist(), (1e3 * _torque(t)).tolist(), strict=True)
+    return _read("\n".join(["clock,encoder,drive", *(",".join(map(repr, row)) for row in rows)]), LINK)
+
+
+def _reading() -> Iterator[Asked]:
+    log, t = _link_log(), STEP * np.arange(SAMPLES, dtype=np.float64)
+    pairs: tuple[tuple[str, Floats, Floats], ...] = (
+        ("times", log.time, BEGINS + t), ("angles", log.channel("coordinates", "th1").values, _turned(t)),
+        ("torques", log.channel("inputs", "torque 1").values, _torque(t)),
+    )  # fmt: skip
+    for what, found, wanted in pairs:
+        worst = int(np.argmax(np.abs(found - wanted)))
+        yield "log", f"{what} of a made-up log", float(found[worst]), float(wanted[worst]), EXACT * (BEGINS + 10.0)
+    ticks = _read(TICKS, COUNTED)
+    yield "log", "times of whole ticks", float(ticks.time[-1] - ticks.time[0]), 2.0 * TICK * STEP_TICKS, EXACT
+    warm, rate = (ticks.channel("sensors", name).values[1] for name in ("warmth", "turns"))
+    yield "log", "a temperature in degrees", float(warm), 273.15 + 20.5, 1e-9
+    yield "log", "a rate in turns a minute", float(rate), 60.0 * 2.0 * math.pi / 60.0, 1e-9
+    late = _read("t,h\n0,1\n0.01,2\n0.02,3\n", BALL)
+    true = late.times("coordinates", "height")
+    yield "log", "when a late height was true", float(true[1]), STEP - DELAY, EXACT
+    yield "log", "a height in mm", float(late.channel("coordinates", "height").values[1]), 2e-3, EXACT
+
+
+def _joined() -> Iterator[Asked]:
+    """Yield what a signal with times of its own is at those of a log."""
+    other = Rows(rows=np.arange(3), time=np.array([0.0, 1.0, 3.0]), values=(np.array([2.0, 4.0, -4.0]),))
+    at = np.array([0.25, 1.0, 2.5])
+    for how, wanted in (("linear", (2.5, 4.0, -2.0)), ("hold", (2.0, 4.0, 4.0))):
+        (found,), lead = join(Path("made up"), how, at, other, "")
+        for one, must in zip(found.tolist(), wanted, strict=True):
+            yield "log", f"a signal that is joined by {how}", one, must, EXACT
+        yield "log", "rows before a signal begins", float(lead), 0.0, 0.0
+
+
+def _measured() -> Iterator[Asked]:
+    """Yield metrics of made-up numbers, a lag of parts of a sample, and the size of a noise."""
+    draw = np.random.default_rng(3)
+    y, yhat = draw.normal(size=(2, 50)) + 2.0
+    off = yhat - y
+    mean = math.fsum(y) / len(y)
+    spread = math.sqrt(math.fsum((y - mean) ** 2))
+    told = "made-up numbers"
+    yield "fit", told, measures.fit(y, yhat), 100.0 * (1.0 - math.sqrt(math.fsum(off**2)) / spread), 1e-6
+    yield "rmse", told, measures.rmse(y, yhat), math.sqrt(math.fsum(off**2) / len(y)), EXACT
+    yield "largest", told, measures.largest(y, yhat), max(abs(x) for x in off.tolist()), EXACT
+    yield "bias", told, measures.bias(y, yhat), math.fsum(off) / len(y), EXACT
+    t = STEP * np.arange(300, dtype=np.float64)
+
+    def moves(s: Floats) -> Floats:
+        return np.sin(3.0 * s) + 0.7 * np.sin(7.3 * s + 1.0) + 0.4 * np.cos(11.9 * s)
+
+    for lag in (2.4 * STEP, -3.7 * STEP):
+        found = measures.delay(moves(t), moves(t + lag), STEP)
+        yield "delay", "a motion that is recorded late", found, lag, 0.02 * STEP
+    noise = draw.normal(size=4000)
+    wanted = math.sqrt(math.fsum(noise**2) / len(noise))
+    yield "noise", "a motion with noise", noise_level([np.sin(0.01 * np.arange(4000)) + noise]), wanted, ALIKE * wanted
+
+
+def _rows(found: Comparison) -> dict[str, float]:
+    return {row.metric: row.value for row in found.rows()}
+
+
+def _link() -> Iterator[Asked]:
+    """Yield how far a replay of the link is from its log, and what is identified from it."""
+    given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
+    log = _link_log()
+    replayed = hw.replay(log, "single_pendulum", parameters=given, restart=0.6)
+    yield "largest", "a replay of its own motion", _rows(replayed)["largest"], 0.0, 1e3 * CLOSE
+    more = given | {"I1": 1.4 * INERTIA, "k1": 0.7 * DRAG}
+    fit = hw.identify(_link_log(LATE), "single_pendulum", ["I1", "k1", "delay"], parameters=more, restart=1.2, hold=0)
+    for name, wanted in (("I1", INERTIA), ("k1", DRAG), ("delay", LATE)):
+        yield f"estimate of {name}", "a link of known motion", fit[name].value, wanted, 1e3 * CLOSE * wanted
+        yield f"interval of {name}", "a link without noise", fit[name].high - fit[name].low, 0.0, 1e4 * CLOSE * wanted
+
+
+def _noisy() -> Iterator[Asked]:
+    """Yield deviations of what is identified of a link whose angles are noisy, beside those of linear least squares."""
+    given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": 1.2 * INERTIA, "k1": DRAG}
+    fit = hw.identify(_link_log(0.0, NOISE), "single_pendulum", ["I1"], parameters=given, restart=0.0, hold=0)
+    spread = _spread()
+    estimate = fit["I1"]
+    yield "std of I1", "a link with noise", estimate.std, spread, 2.0 * ALIKE * spread
+    yield "estimate of I1", "a link with noise", estimate.value, INERTIA, 5.0 * spread
+    wide = (estimate.high - estimate.low) / (2.0 * estimate.std)
+    yield "interval", "in deviations", wide, 1.96, 0.1
+
+
+def _spread() -> float:
+    """Return the deviation of the link's inertia by least squares in it and its start, by differences."""
+    t, step, settles = STEP * np.arange(SAMPLES, dtype=np.float64), 1e-4 * INERTIA, (INERTIA + MASS * REACH**2) / DRAG
+    slope = (_turned(t, INERTIA + step) - _turned(t, INERTIA - step)) / (2.0 * step)
+    slopes = np.column_stack([slope, np.ones(SAMPLES), settles * (1.0 - np.exp(-t / settles))])
+    return NOISE * math.sqrt(float(np.linalg.inv(slopes.T @ slopes)[0, 0]))
+
+
+def _ball() -> Iterator[Asked]:
+    """Yield metrics of a ball whose windows start at what is measured late: ahead by g a d + g d^2/2 at the age a."""
+    t = STEP * np.arange(round(FLIES / STEP) + 2)
+    true = t - DELAY
+    heights = HEIGHT + SPEED * true - 0.5 * G * true**2
+    text = "\n".join(["t,h", *(f"{a!r},{1e3 * b!r}" for a, b in zip(t.tolist(), heights.tolist(), strict=True))])
+    found = hw.replay(_read(text, BALL), "ball", parameters={"gravity": G}, restart=WINDOW)
+    found = replace(found, predictions=tuple(replace(one, wall_s=WALL) for one in found.predictions))
+    rows, count = _rows(found), round(WINDOW / STEP)
+    ages = np.concatenate([STEP * np.arange(count + 1) - DELAY] * 2)
+    ahead = G * (ages * DELAY + 0.5 * DELAY**2)
+    told = "a ball that is recorded late"
+    yield "windows", told, float(len(found.windows)), 2.0, 0.0
+    yield "bias", told, rows["bias"], math.fsum(ahead) / len(ahead), CLOSE
+    yield "rmse", told, rows["rmse"], math.sqrt(math.fsum(ahead**2) / len(ahead)), CLOSE
+    yield "largest", told, rows["largest"], float(ahead.max()), CLOSE
+    y = found.measured[:, 0]
+    spread = math.sqrt(math.fsum((y - math.fsum(y) / len(y)) ** 2))
+    yield "fit", told, rows["fit"], 100.0 * (1.0 - math.sqrt(math.fsum(ahead**2)) / spread), 1e-3
+    for age in (0.5 * WINDOW, WINDOW):
+        wanted = G * ((age - DELAY) * DELAY + 0.5 * DELAY**2)
+        for name in ("median", "90"):
+            yield f"error_{age:g}s_{name}", told, rows[f"error_{age:g}s_{name}"], wanted, CLOSE
+    yield "speed", told, rows["speed"], 2.0 * WINDOW / WALL, EXACT
+    yield "windows_failed", told, rows["windows_failed"], 0.0, 0.0
+    failed = replace(found.predictions[0], outcomes=(Outcome.NOT_FINITE, Outcome.FINISHED))
+    one = _rows(replace(found, predictions=(failed,)))
+    yield "windows_failed", "a prediction that failed once", one["windows_failed"], 1.0, 0.0
+
+
+def _bounces() -> Iterator[Asked]:
+    """Yield how late, and by how much weaker, the impacts of a prediction are than those that are measured."""
+    t = STEP * np.arange(round(FLIES / STEP) + 2)
+    text = "\n".join(["t,h", *(f"{a!r},1000.0" for a in t.tolist())])
+    found = hw.replay(_read(text, BALL), "ball", parameters={"gravity": G}, restart=0.0)
+    (window,), (one,) = found.windows, found.predictions
+    at, late, up, less = 0.3, 0.03, 2.5, 0.8
+    falls, shifted = (np.where(window.t < hit, hit - window.t, keeps * up * (window.t - hit))[:, None]
+                      for hit, keeps in ((at, 1.0), (at + late, less)))  # fmt: skip
+    made: Any = replace(found, windows=(replace(window, y=falls),), predictions=(replace(one, y=(shifted,)),), mass=2.0)
+    rows, told = _rows(made), "a ball that bounces late"
+    yield "impact_offset_median", told, rows["impact_offset_median"], late, 1e-6
+    yield "impact_offset_largest", told, rows["impact_offset_largest"], late, 1e-6
+    yield "impulse_measured", told, rows["impulse_measured"], 2.0 * (1.0 + up), 1e-6
+    yield "impulse_error", told, rows["impulse_error"], 2.0 * up * (less - 1.0), 1e-6
+    yield "impacts_too_many", told, rows["impacts_too_many"], 0.0, 0.0

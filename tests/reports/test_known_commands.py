@@ -1,0 +1,79 @@
+"""Commands that judge no run ask for known answers before they say a number, and end where one is another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from crossbody.cases.errors import OwnFault
+from crossbody.hw.fitting import covariance
+from crossbody.hw.reading.plan import Source
+from crossbody.hw.replaying import measures
+from crossbody.reference.linear import LinearModel
+from crossbody.reports.analysis import known_analysis, numbers
+from crossbody.reports.bench import known_bench, measure
+from crossbody.reports.cli import cli
+from crossbody.reports.judging import known
+from crossbody.reports.pages import known_pictures
+from crossbody.reports.replay import known_replay
+
+SUPPORT = Path(__file__).parents[1] / "support"
+LOG = (str(SUPPORT / "falling_ball.csv"), "--columns", str(SUPPORT / "falling_ball.toml"), "-m", "ball", "-q")
+COMMANDS = {
+    "replay": ("replay", *LOG, "-e", "reference", "--out", "out"),
+    "identify": ("identify", *LOG, "--free", "gravity", "--hold", "0", "--out", "out"),
+    "bench": ("bench", "bouncing_ball", "--variant", "linear", "--repeats", "1", "-q", "--out", "out"),
+    "analyse": ("analyse", "bouncing_ball", "--variant", "linear", "-q"),
+    "picture": ("picture", "none", "out"),
+    "bode": ("bode", "soft_contact", "-q", "--out", "out"),
+}  # fmt: skip
+MODULES = {"replay": known_replay, "bench": known_bench, "analyse": known_analysis, "picture": known_pictures}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_what_is_right_is_not_told(name: str) -> None:
+    assert MODULES[name].wrong() == ()
+    known.check(name)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_ends_where_an_answer_is_wrong(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    kind = {"identify": "replay", "bode": "analyse"}.get(name, name)
+    monkeypatch.setattr(MODULES[kind], "wrong", lambda: (("rmse", 1.0, (2.0, 2.0), "a log"),) * 2)
+    ended = CliRunner().invoke(cli, COMMANDS[name])
+    assert isinstance(ended.exception, OwnFault)
+    assert str(ended.exception) == (
+        "No number can be trusted: rmse of a log is 1, but must be 2. 1 more numbers are wrong."
+    )
+    assert not (tmp_path / "out").exists()
+
+
+OFF: dict[str, tuple[Any, str, Any]] = {
+    "replay": (measures, "bias", lambda y, yhat: float(np.mean(y - yhat))),
+    "replay in a unit": (Source, "to_si", lambda source, raw: source.conversion.apply(raw)),
+    "replay with deviations": (covariance, "LEVEL", 0.8),
+    "bench": (measure, "NATIVE", 1),
+    "analyse": (numbers, "controllable", lambda model: len(model.states)),
+    "analyse without damping": (LinearModel, "poles", lambda model: 1j * np.linalg.eigvals(model.A)),
+}
+
+
+@pytest.mark.parametrize("what", OFF)
+def test_a_number_that_is_off_is_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = MODULES[what.split()[0]]
+    own, name, other = OFF[what]
+    for cached in ("wrong", "_link_log", "_hanging"):
+        if hasattr(module, cached):
+            getattr(module, cached).cache_clear()
+    monkeypatch.setattr(own, name, other)
+    try:
+        assert module.wrong()
+    finally:
+        for cached in ("wrong", "_link_log", "_hanging"):
+            if hasattr(module, cached):
+                getattr(module, cached).cache_clear()
