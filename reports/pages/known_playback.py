@@ -154,6 +154,6 @@ def _sides() -> Iterator[Said]:
 
 
 KINDS = {
-    "playback": _playback, "loops of force": _loops, "friction figures": _friction, "loops": _sides,
     "loops off scale": _far,
+    "playback": _playback, "loops of force": _loops, "friction figures": _friction, "loops": _sides,
 }  # fmt: skip
