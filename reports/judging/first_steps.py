@@ -204,7 +204,7 @@ def _sized(draw: np.random.Generator, shape: tuple[int, ...]) -> Floats:
     return draw.choice([-1.0, 1.0], shape) * draw.uniform(SMALL, 1.0, shape)
 
 
-def _ends(actuator: Actuator) -> tuple[float, float]:
+def _ends(actuator: Actuator) -> tuple[float, ...]:
     return (-HELD, HELD) if np.isfinite(actuator.activation_range).any() else UNBOUNDED
 
 
