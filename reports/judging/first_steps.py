@@ -26,10 +26,11 @@ from crossbody.cases import Case, CrossbodyError, Inputs, Trajectory
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.rotations import normalised
-from crossbody.cases.scene import UNBOUNDED
+from crossbody.cases.scene import UNBOUNDED, Actuator
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts, watched
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.scale import of_like
 
 if TYPE_CHECKING:
     from crossbody.reference import System
@@ -61,6 +62,9 @@ CHANGES, GROWS, HALF = 2e-7, 1e-3, 0.5
 from its touch a pair meets at most."""
 NEWTON, ROUNDED, NONE = 20, 1e-13, 1e-8
 """Iterations that place bodies, m; and part of a momentum that is none."""
+BEYOND, HELD, SMALL = 1.5, 0.6, 0.7
+"""How many times the end of its range a control is drawn up to, the ends of activations that have a range, and the part
+of what it is drawn up to that any number is at least."""
 SEED, USUAL, LEAST = 20240917, 1e-3, 1e-5
 """Of all draws; the step, s, in the place of none, and the least of which parts are told from rounding."""
 MOST = 4  # pairs that meet: what is wrong with one is with all, or with the first of two shapes
@@ -153,20 +157,20 @@ class Probe:
         """Return the case with activations that follow controls of a size, none for 0, within an instant, s.
 
         Controls are given anew in every step of the first half, where they jump or not. Neither their ranges nor those
-        of forces end what they do.
+        of forces end what they do, but for those of activations that have one: within these they are held.
         """
         case = self.case
         assert case.scene is not None
         drawn = np.random.default_rng(SEED)
-        start, inputs = size * drawn.uniform(-1.0, 1.0, len(case.act0)), case.scene.inputs
-        values = size * drawn.uniform(-1.0, 1.0, (len(JUMPS), len(inputs)))
+        start, inputs = size * _sized(drawn, (len(case.act0),)), case.scene.inputs
+        values = size * _sized(drawn, (len(JUMPS), len(inputs)))
         given = distinct(np.arange(steps // 2) / steps, JUMPS)
         values = values[np.searchsorted(JUMPS, given, side="right") - 1]
         for i in (i for i in case.scene.activated if case.scene.actuators[i].activation == "integrator"):
             values[:, i] /= t_end
         return replace(
             case, scene=case.scene.replace(actuators=tuple(
-                replace(one, control_range=UNBOUNDED, activation_range=UNBOUNDED, force_range=UNBOUNDED,
+                replace(one, control_range=UNBOUNDED, activation_range=_ends(one), force_range=UNBOUNDED,
                         time_constant=FILTERS * t_end if one.activation == "filter" else 0.0) if one.activation else one
                 for one in case.scene.actuators
             )), act0=start, inputs=Inputs(names=inputs, times=t_end * given, values=values),
@@ -186,11 +190,33 @@ class Probe:
         scene, inputs = self.case.scene, self.case.inputs
         names = scene.inputs if scene is not None and self.case.general else ()
         size = float(np.max(np.abs(inputs.values), initial=1e-3)) if inputs is not None else 1.0
-        values = np.random.default_rng(SEED).uniform(-size, size, (jumps, len(names)))
+        sizes = [_beyond(one, size) for one in scene.actuators] if names and scene is not None else []
+        widths = np.array([*sizes, *[size] * (len(names) - len(sizes))])
+        values = widths * _sized(np.random.default_rng(SEED), (jumps, len(names)))
         return replace(
             self.case, q0=q, v0=v, t_end=t_end, closed_form=None, claims=(), chaos=None, consistent=False,
             inputs=Inputs(names=names, times=np.array([0.0, 0.5 * t_end])[:jumps], values=values) if names else None,
         )  # fmt: skip
+
+
+def _sized(draw: np.random.Generator, shape: tuple[int, ...]) -> Floats:
+    """Return numbers of either sign and of sizes up to 1, none of which is small."""
+    return draw.choice([-1.0, 1.0], shape) * draw.uniform(SMALL, 1.0, shape)
+
+
+def _ends(actuator: Actuator) -> tuple[float, ...]:
+    return (-HELD, HELD) if np.isfinite(actuator.activation_range).any() else UNBOUNDED
+
+
+def _beyond(actuator: Actuator, size: float) -> float:
+    """Return up to what a control is drawn, so that it comes to the ends of its range, and its force to those of its.
+
+    A servo's force depends on where it is, too: it is asked for what its control adds.
+    """
+    ends = [abs(end) for end in actuator.control_range]
+    if actuator.gain[0] and not actuator.activation:
+        ends += [abs(end / actuator.gain[0]) for end in actuator.force_range]
+    return max([size, *(BEYOND * end for end in ends if math.isfinite(end))])
 
 
 def first_steps(
@@ -245,10 +271,10 @@ def _free(probe: Probe) -> Iterator[AuditRow]:
     wanted, least = exact.v[-1] - v, t_end / probe.case.t_end * FAST
     along = np.array([exact.v[np.searchsorted(exact.t, t, side="right") - 1] for t in quarters])  # inputs jump amid
     bends = float(np.max(np.abs(along[2::2] - 2.0 * along[1::2] + along[:-1:2])))
-    size = max(float(np.max(np.abs(wanted))), least) + bends / TOLERANCE
+    size = np.maximum(of_like(np.abs(wanted), probe.case.velocities), least) + bends / TOLERANCE
     changed = np.full(len(v), np.inf) if run is None else run.v[-1] - v
-    yield _row("acceleration", changed / t_end, wanted / t_end, float(np.max(np.abs(changed - wanted))) / size)
-    if run is not None and size > 2.0 * least and math.isfinite(probe.engine.steps[probe.profile]):
+    yield _row("acceleration", changed / t_end, wanted / t_end, float(np.max(np.abs(changed - wanted) / size)))
+    if run is not None and float(np.max(size)) > 2.0 * least and math.isfinite(probe.engine.steps[probe.profile]):
         yield from _places(probe, run)
 
 

@@ -25,7 +25,6 @@ from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.parts import RATIO, Study
 from crossbody.reports.judging.reach import BUDGET, estimated, followed
 from crossbody.reports.judging.run_verdicts import Entry, crash
-from crossbody.reports.judging.start_of_file import start_of_file
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
@@ -196,7 +195,11 @@ def _ran(
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     own = {name: value for name, value in asked.items() if name in prepared.settings}
-    rows += (*settings_kept(shown, prepared.settings), *start_of_file(case))
+    rows += settings_kept(shown, prepared.settings)
+    if case.file:
+        from crossbody.reports.judging.start_of_file import start_of_file  # parsers that other cases do without
+
+        rows += start_of_file(case)
     rows += first_steps(case, (engines.load(pick.engine), prepared.profile), prepared.settings, own, rows, reference)
     began, clock, compiled = process_time(), perf_counter(), count.seconds
     made = prepared.run()

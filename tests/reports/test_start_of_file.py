@@ -65,7 +65,7 @@ def test_a_push_that_does_not_end_or_acts_on_another_body_is_told() -> None:
 
 def test_a_table_that_comes_a_row_late_is_told(tmp_path: Path) -> None:
     path = tmp_path / "controls.csv"
-    path.write_text("integrator,t,filter\n0,0,1\n.2,.01,.5\n.3,.02,.4\n")
+    path.write_text("integrator,t,filter,bounded,weak\n0,0,1,0,0\n.2,.01,.5,0,1\n.3,.02,.4,1,0\n")
     case = cases.load(str(BOX), "two", ctrl=str(path))
     assert case.inputs is not None
     assert wrong(case) == []
