@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter, process_time
 from typing import Any, TypeVar
 
@@ -43,9 +45,12 @@ STUDY_S = 20.0
 OF_STUDIES, DEARER = 2.0, 3.0
 """Time that all runs of a study of a scene may take, in budgets, by what its own run took; one at
 a tight tolerance is taken to cost so many times as much."""
-FIRST, DEAR = 0.02, 12.0
-"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it
-is not begun unless its profile is asked for: engines that follow the law take their steps in Python."""
+FIRST, DEAR = 0.02, 4.0
+"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
+unless its profile is asked for: engines that follow the law take their steps in Python."""
+AHEAD, BEYOND = 0.05, 1.0
+"""Part of the time for which a truth is known by which a run goes on behind it, and the time, in budgets, that it may
+take from there to its horizon: nothing is compared there."""
 COMPILED = ("reference", "compiled")  # who follows what the truth has followed
 _OF_RUNS = {"profile": TEXT, "settings": Public("a mapping from names to values", lambda one: isinstance(one, Mapping))}
 _Kind = TypeVar("_Kind")
@@ -123,7 +128,8 @@ def run_case(
         watch.limited(label, limit)
         why = watch.lost(label)
         began = _clock()
-        entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine, budget)
+        made = partial(_entry, case, pick, of_pick(asked, pick), reference, refine, budget, truth.trusted)
+        entry = ended(case, pick, why) if why else made()
         own = _own(case, pick, entry, settings or {})
         entries.append(replace(entry, took_s=_clock() - began, asked=own))
     watch.unlimited()
@@ -167,14 +173,16 @@ def of_start(case: Case, why: str) -> Trajectory:
 
 
 def _entry(
-    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
+    known: float,
 ) -> Entry:  # fmt: skip
     """The run of one engine; whatever it throws is a row, and the others are judged."""
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
         refine = refine or judges_parts(case, pick.engine, pick.profile)
-        return _ran(case, pick, asked, reference, refine, budget)
+        run = partial(_ran, pick=pick, asked=asked, reference=reference, refine=refine, budget=budget)
+        return _as_far(case, pick, known, run)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
@@ -183,13 +191,37 @@ def _entry(
         return Entry(engine=pick.engine, profile=pick.profile, crashed=crash(error))
 
 
+def _as_far(case: Case, pick: Pick, known: float, run: Callable[..., Any]) -> Entry:
+    """The run of one engine, not beyond the end of the truth where that costs too much: nothing is compared there.
+
+    Args:
+        case: the scene.
+        pick: the engine.
+        known: the end of the truth, s.
+        run: runs a case, and returns its entry; None where what is left, so many times as long, is cheap.
+    """
+    end = float(f"{(1.0 + AHEAD) * known:.2g}") if math.isfinite(known) else case.t_end
+    short = replace(case, t_end=end) if _bounded(case, pick) and end < case.t_end else case
+    if found := run(short, left=case.t_end / short.t_end - 1.0):
+        return found if short is case else replace(found, until=end)
+    with suppress(CaseUnsupported):  # it may come to what takes long
+        return run(case)
+    return replace(run(short), until=end)
+
+
+def _bounded(case: Case, pick: Pick) -> bool:
+    """Return whether a run is left out where it takes too long."""
+    return pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
+
+
 def _ran(
-    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
-) -> Entry:  # fmt: skip
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
+    left: float = 0.0,
+) -> Entry | None:  # fmt: skip
     most = DEAR * budget
     if pick.every and (dear := _dear(case, pick, asked, most)):
         raise CaseUnsupported(dear)
-    bounded = pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
+    bounded = _bounded(case, pick)
     prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
     shown = _of_engine(pick, "audit", prepared.audit(), Mapping, "a mapping")  # type: ignore[type-abstract]
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
@@ -203,6 +235,8 @@ def _ran(
     if bounded and natural.outcome is Outcome.TIME_LIMIT:
         raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
+    if natural.outcome.ok and 0.0 < left * took <= BEYOND * budget:
+        return None
     run = _dense(case, pick, prepared, natural, asked)
     studied = refine and natural.outcome.ok
     return Entry(
