@@ -301,8 +301,9 @@ def _growing(case: Case, truth: Trajectory, limit: float) -> tuple[Floats, Float
 
     Of a scene, and of any case with other parameters than those that its limits are for.
 
-    Its velocities are put off, on its rows. A neighbour that gets less far, or takes longer than
-    a limit, s, tells of growth as far as it gets: limits are the stricter for what is not known.
+    Its velocities are put off, on its rows, and followed up to where the law determines them. A neighbour that gets less
+    far, or takes longer than a limit, s, tells of growth as far as it gets: limits are the stricter for what is not
+    known.
     """
     fastest = max(float(np.max(np.abs(truth.v), initial=0.0)), RESTS)  # what balances falls, however slowly
     if not (case.general or changed(case)) or not truth.outcome.ok or not fastest < math.inf:
@@ -311,14 +312,14 @@ def _growing(case: Case, truth: Trajectory, limit: float) -> tuple[Floats, Float
 
     rng, system = np.random.default_rng(0), system_of(case)
     some = distinct(np.searchsorted(truth.t, np.linspace(0.0, float(truth.t[-1]), INSTANTS)))
-    t, exact, most = truth.t[some], truth.q[some], np.ones(len(some))
+    t, exact, most, end = truth.t[some], truth.q[some], np.ones(len(some)), _determined(case, truth).t_end
     held = system.constraint(case.q0, case.v0)[0][~case.law.unilateral]
     for _ in range(DIRECTIONS):
         way = rng.choice([-1.0, 1.0], size=len(case.v0))
         way -= np.linalg.lstsq(held, held @ way, rcond=None)[0] if len(held) else 0.0
         off = NUDGE * fastest
-        nudged = replace(case, v0=case.v0 + off * way)
-        run = motion(nudged, case.tight, samples=t, time_limit=limit)
+        nudged = replace(case, v0=case.v0 + off * way, t_end=end)
+        run = motion(nudged, case.tight, samples=t[t <= end], time_limit=limit)
         count = int(np.searchsorted(t, run.t[-1], side="right")) if len(run.t) else 0
         apart = np.zeros(len(t))
         apart[:count] = np.max(differences(run.q[:count], exact[:count], case.quaternions), axis=1)

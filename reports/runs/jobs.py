@@ -182,7 +182,7 @@ def _entry(
     try:
         refine = refine or judges_parts(case, pick.engine, pick.profile)
         run = partial(_ran, pick=pick, asked=asked, reference=reference, refine=refine, budget=budget)
-        return _as_far(case, pick, known, run)
+        return _as_far(case, pick, known, partial(run, known=known))
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
@@ -200,13 +200,18 @@ def _as_far(case: Case, pick: Pick, known: float, run: Callable[..., Any]) -> En
         known: the end of the truth, s.
         run: runs a case, and returns its entry; None where what is left, so many times as long, is cheap.
     """
-    end = float(f"{(1.0 + AHEAD) * known:.2g}") if math.isfinite(known) else case.t_end
-    short = replace(case, t_end=end) if _bounded(case, pick) and end < case.t_end else case
+    short = ahead_of(case, known) if _bounded(case, pick) else case
     if found := run(short, left=case.t_end / short.t_end - 1.0):
-        return found if short is case else replace(found, until=end)
+        return found if short is case else replace(found, until=short.t_end)
     with suppress(CaseUnsupported):  # it may come to what takes long
         return run(case)
-    return replace(run(short), until=end)
+    return replace(run(short), until=short.t_end)
+
+
+def ahead_of(case: Case, known: float) -> Case:
+    """Return a scene up to a little behind the instant, s, to which its truth is known; as it is if to the end."""
+    end = float(f"{(1.0 + AHEAD) * known:.2g}") if math.isfinite(known) else case.t_end
+    return replace(case, t_end=end) if case.general and end < case.t_end else case
 
 
 def _bounded(case: Case, pick: Pick) -> bool:
@@ -216,7 +221,7 @@ def _bounded(case: Case, pick: Pick) -> bool:
 
 def _ran(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
-    left: float = 0.0,
+    known: float, left: float = 0.0,
 ) -> Entry | None:  # fmt: skip
     most = DEAR * budget
     if pick.every and (dear := _dear(case, pick, asked, most)):
@@ -238,7 +243,7 @@ def _ran(
     if natural.outcome.ok and 0.0 < left * took <= BEYOND * budget:
         return None
     run = _dense(case, pick, prepared, natural, asked)
-    studied = refine and natural.outcome.ok
+    studied, part = refine and natural.outcome.ok, ahead_of(case, known).t_end / case.t_end
     return Entry(
         engine=pick.engine,
         profile=pick.profile,
@@ -247,7 +252,9 @@ def _ran(
         run=run,
         clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled),
         audit=rows,
-        study=_study(case, pick, prepared, natural, run, took, OF_STUDIES * budget) if studied else None,
+        study=_study(ahead_of(case, known), pick, prepared, natural, run, took * part, OF_STUDIES * budget)
+        if studied
+        else None,
         hidden=hidden,
         own=law_of(prepared.follows) if refine and prepared.follows is not None else None,
     )
@@ -322,7 +329,8 @@ def _study(
 ) -> Study:  # fmt: skip
     """The other runs of an engine that tell the parts of its error; those of its model where its equations are known.
 
-    Where it reads the file by itself they are of the model that is built from the scene.
+    They go as far as the case, which may end before the runs that are known: where its truth does. Where it reads the
+    file by itself they are of the model that is built from the scene.
     """
     settings = prepared.settings
 
@@ -337,7 +345,7 @@ def _study(
 
     of_scene = {READER: "scene"} if settings.get(READER) == "file" else {}
     size = {name: float(settings[name]) for name in ("dt", "rtol") if name in settings}
-    samples = {"samples": np.array(judged.t)} if "samples" in settings else {}
+    samples = {"samples": np.array(judged.t[judged.t <= case.t_end])} if "samples" in settings else {}
     built = run(**of_scene, **size) if of_scene else None
     of_scene = {} if isinstance(built, str) else of_scene
     told: dict[str, Any] = {"why_built": built} if isinstance(built, str) else {"built": built}
