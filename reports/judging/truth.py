@@ -301,9 +301,9 @@ def _growing(case: Case, truth: Trajectory, limit: float) -> tuple[Floats, Float
 
     Of a scene, and of any case with other parameters than those that its limits are for.
 
-    Its velocities are put off, on its rows, and followed up to where the law determines them. A neighbour that gets less
-    far, or takes longer than a limit, s, tells of growth as far as it gets: limits are the stricter for what is not
-    known.
+    Its velocities are put off, on its rows, and followed up to where the law determines them. A neighbour that gets
+    less far, or takes longer than a limit, s, tells of growth as far as it gets: limits are the stricter for what is
+    not known.
     """
     fastest = max(float(np.max(np.abs(truth.v), initial=0.0)), RESTS)  # what balances falls, however slowly
     if not (case.general or changed(case)) or not truth.outcome.ok or not fastest < math.inf:

@@ -41,7 +41,7 @@ def off(truth: Truth, expected: float, found: float, guard: Callable[[Trajectory
             return late
     near = _dense(truth.trajectory)(np.maximum(expected - late * BEFORE, truth.trajectory.t[0]))
     part = float(np.max(np.abs(guard(near)))) / known if known > 0.0 else np.inf
-    return short * part if part <= truth.grows else late
+    return min(short * part, late) if part <= truth.grows else late
 
 
 @remembered(4)

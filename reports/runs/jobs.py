@@ -181,8 +181,8 @@ def _entry(
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
         refine = refine or judges_parts(case, pick.engine, pick.profile)
-        run = partial(_ran, pick=pick, asked=asked, reference=reference, refine=refine, budget=budget)
-        return _as_far(case, pick, known, partial(run, known=known))
+        run = partial(_ran, pick=pick, asked=asked, reference=reference, refine=refine, budget=budget, known=known)
+        return _as_far(case, pick, known, run)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
@@ -191,21 +191,27 @@ def _entry(
         return Entry(engine=pick.engine, profile=pick.profile, crashed=crash(error))
 
 
-def _as_far(case: Case, pick: Pick, known: float, run: Callable[..., Any]) -> Entry:
+def _as_far(case: Case, pick: Pick, known: float, run: Callable[..., Entry]) -> Entry:
     """The run of one engine, not beyond the end of the truth where that costs too much: nothing is compared there.
 
     Args:
         case: the scene.
         pick: the engine.
         known: the end of the truth, s.
-        run: runs a case, and returns its entry; None where what is left, so many times as long, is cheap.
+        run: runs a case, unless what is left, so many times as long, is cheap (`_CheapError`).
     """
     short = ahead_of(case, known) if _bounded(case, pick) else case
-    if found := run(short, left=case.t_end / short.t_end - 1.0):
-        return found if short is case else replace(found, until=short.t_end)
-    with suppress(CaseUnsupported):  # it may come to what takes long
-        return run(case)
-    return replace(run(short), until=short.t_end)
+    try:
+        found = run(short, left=case.t_end / short.t_end - 1.0)
+    except _CheapError:
+        with suppress(CaseUnsupported):  # it may come to what takes long
+            return run(case)
+        found = run(short)
+    return found if short is case else replace(found, until=short.t_end)
+
+
+class _CheapError(Exception):
+    """What is left of a run costs little."""
 
 
 def ahead_of(case: Case, known: float) -> Case:
@@ -222,7 +228,7 @@ def _bounded(case: Case, pick: Pick) -> bool:
 def _ran(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
     known: float, left: float = 0.0,
-) -> Entry | None:  # fmt: skip
+) -> Entry:  # fmt: skip
     most = DEAR * budget
     if pick.every and (dear := _dear(case, pick, asked, most)):
         raise CaseUnsupported(dear)
@@ -241,7 +247,7 @@ def _ran(
         raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
     if natural.outcome.ok and 0.0 < left * took <= BEYOND * budget:
-        return None
+        raise _CheapError
     run = _dense(case, pick, prepared, natural, asked)
     studied, part = refine and natural.outcome.ok, ahead_of(case, known).t_end / case.t_end
     return Entry(
