@@ -19,7 +19,7 @@ COARSE, LEAST, MANY = 1e-9, 50, 20
 the least that counts: of a method of order 8 the tightest takes 3 times as many, unless rounding
 is what its errors are made of."""
 LADDER = (1.0, 10.0, 100.0, 1000.0)  # tolerances that are tried, in units of `Case.tight`
-BOUNDED = 2  # the first so many of them are left for the next where they take too many steps
+BOUNDED = 3  # the first so many of them are left for the next where they take too many steps
 SHORTER = 0.1
 """Each is left for the next, too, where a run that its budget ends gets less far than this part
 of the coarse one: where stiff contacts slide steps are of low order, and a hundred times as many

@@ -84,6 +84,7 @@ class Entry:
         asked: of the settings, those that were asked for.
         took_s: what all of that took, s: preparation and the runs that tell the parts of its error too,
             compilation aside.
+        until: up to when it was run, s, where the truth is known no further and the rest would cost too much.
     """
 
     engine: str
@@ -100,6 +101,7 @@ class Entry:
     crashed: str = ""
     asked: Mapping[str, Value] = field(default_factory=dict)
     took_s: float = 0.0
+    until: float = math.inf
 
     @property
     def options(self) -> str:
@@ -291,13 +293,15 @@ def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
 
 def finished(judge_: Judge, run: Trajectory) -> Verdict:
     """Whether the run reached its horizon: if not it is outside with the advice, whatever it says."""
-    t_end = judge_.case.t_end
+    t_end = min(judge_.case.t_end, judge_.entry.until)
     end = float(run.t[-1]) if len(run.t) else 0.0
     if not run.outcome.ok:
         told = "" if run.outcome.advice in run.message else run.outcome.advice
         why = " ".join(text for text in (f"{run.outcome.value}:", run.message, told) if text)
     elif abs(end - t_end) <= REACHED * t_end:
-        return judge_.row("finished", 1.0, "1", Word.WITHIN, "", expected=1.0, limit=0.0)
+        short = f"Run to {t_end:.4g} s: behind that the truth is not known, and more takes longer than --budget allows."
+        why = short if t_end < judge_.case.t_end else ""
+        return judge_.row("finished", 1.0, "1", Word.WITHIN, why, expected=1.0, limit=0.0)
     else:
         why = f"It reports that it finished, but its record ends at t = {end:.9g} s instead of {t_end:.9g} s."
     return judge_.row("finished", 0.0, "1", Word.OUTSIDE, why, expected=1.0, limit=0.0)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, CaseUnsupported, Chaos, EngineUnavailable, Outcome, Tier, Trajectory, arguments
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.contacts import CLOSED
 from crossbody.cases.rotations import differences
 from crossbody.cases.trajectory import Ledger
 from crossbody.reference import ahead
 from crossbody.reports.judging.answers import Answers
-from crossbody.reports.judging.reach import BUDGET, Followed, estimated, followed, motion, tight
+from crossbody.reports.judging.reach import BUDGET, SHORTEST, Followed, estimated, followed, motion, tight
 from crossbody.reports.judging.stored import changed
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
@@ -28,8 +27,9 @@ SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 WITNESS = 100.0
 """Tolerance of the witness that shares nothing but the scene, likewise: in Python steps cost 1e3 more."""
-OF_WITNESS, SHARE = 8.0, 0.05
-"""Time that this witness may take, in budgets, by what it takes for the first part of the horizon, and that part."""
+OF_WITNESS, SHARE = 4.0, 0.05
+"""Time that a witness of a scene may take, in budgets, by what it takes for the first part of the horizon, and that
+part."""
 NUDGE, DIRECTIONS, INSTANTS = 1e-7, 2, 201
 """By how much of the largest velocity a start is put off, in how many directions, and when it is seen."""
 PARTED = 1e-6
@@ -108,63 +108,117 @@ def law_of(case: Case) -> Truth | None:
     return replace(found, source=rule + found.source)
 
 
-def _integrated(case: Case, first: Trajectory, other: str, why: str = "", budget: float = BUDGET) -> Truth:
+def _integrated(case: Case, first: Trajectory, other: str, budget: float = BUDGET) -> Truth:
     """The compiled integrator at its tightest, held against another: tier C if independent, else D."""
-    from crossbody.cases.scene_contacts import frictional
 
     @Answers
     def at(times: Floats) -> Trajectory:
-        run = motion(case, case.tight, samples=np.array(times))
+        asked = (
+            replace(case, t_end=min(max(float(times[-1]), SHORTEST * case.t_end), case.t_end)) if case.general else case
+        )
+        run = motion(asked, case.tight, samples=np.array(times))
         # A run that is asked for samples need not take the same steps: its events move by the tolerance.
         run = replace(with_both_sides(run, first), events=first.events, switches=first.switches)
         return run if first.outcome.ok else replace(run, outcome=first.outcome, message=first.message)
 
     dense = at(sample_times(first, case.t_end))
-    tier = Tier.D if other == "compiled" else Tier.C
-    rubs = tier is Tier.C and case.scene is not None and frictional(case.scene) is not None
-    who, loose = other, SECOND * case.tight
-    shared = "equations, integrator and event location" if tier is Tier.D else "only the equations of the mechanism"
-    second = _witness(case, OF_WITNESS * budget) if case.general and tier is Tier.C and not rubs else None
-    if isinstance(second, Trajectory):
-        who, loose, shared = "Pinocchio with CVODE", WITNESS * case.tight, "only the scene"
-    else:
-        why = f" ({second})" if second else why
-        limit = OF_WITNESS * budget if case.general and tier is Tier.C else math.inf
-        found = _in_time(case, other, loose, limit)
-        if rubs and isinstance(found, Trajectory) and not (found.outcome.ok or found.outcome is first.outcome):
-            found = f"CVODE ends {found.outcome.value} at t = {found.t[-1]:.4g} s"
-        if isinstance(found, str):
-            return _integrated(case, first, "compiled", f" ({found})", budget)
-        second = found
-    t, grown = _growing(case, dense, at, budget)
     truth = Truth(
-        tier=tier, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
-        grows=float(grown[-1]), touches=case.law.touches, joined=case.general,
+        tier=Tier.D, source="", trajectory=dense, at=at, expect=at.expect, agreement={}, tight=case.tight,
+        touches=case.law.touches, joined=case.general,
     )  # fmt: skip
-    truth = held_against(truth, second, case, loose)
-    if (horizon := _horizon(case, truth, second, t, grown)) is not None:
+    second = _second(case, truth, other, budget)
+    t, grown = _growing(case, dense, budget)
+    truth = held_against(replace(truth, tier=second.tier, grows=float(grown[-1])), second.run, case, second.rtol)
+    if (horizon := _horizon(case, truth, second.run, t, grown)) is not None:
         known = replace(truth, horizon=horizon, grows=float(np.interp(horizon.until, t, grown)))
-        truth = held_against(known, second, replace(case, chaos=horizon), loose)
+        truth = held_against(known, second.run, replace(case, chaos=horizon), second.rtol)
     said = ", ".join(f"{name} {value:.1e}" for name, value in truth.agreement.items())
-    source = f"compiled reference at rtol {case.tight:g}, {who} at {loose:g} agrees: {said}; they share {shared}{why}"
+    source = f"compiled reference at rtol {case.tight:g}, {second.name} at {second.rtol:g} agrees: {said}"
+    source += f"; they share {second.shared}{second.why and f' ({second.why})'}"
     if truth.parted < case.t_end:
         apart = f"they diverge at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
-        ended = f"{who} ends {second.outcome.value} at t = {truth.parted:.4g} s"
+        ended = f"{second.name} ends {second.run.outcome.value} at t = {truth.parted:.4g} s"
         source += f"; {ended if math.isnan(truth.growth) else apart}"
     return _rechecked(replace(truth, source=source), case)
 
 
-def _in_time(case: Case, solver: str, rtol: float, limit: float) -> Trajectory | str:
-    """A motion by another solver of the reference, or that it would take longer, s: CVODE's equations are in Python."""
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What a truth is held against.
+
+    Attributes:
+        run: its motion.
+        name: whose that is.
+        rtol: its tolerance.
+        shared: what it has in common with the truth.
+        tier: how the truth is known by it.
+        why: no other source that has less in common; empty where there is none.
+    """
+
+    run: Trajectory
+    name: str
+    rtol: float
+    shared: str
+    tier: Tier
+    why: str = ""
+
+
+def _second(case: Case, truth: Truth, other: str, budget: float) -> _Source:
+    """The source that has least in common with a truth, of those that get as far in their time."""
+    from crossbody.cases.scene_contacts import frictional
+
+    why, rtol, known = "", SECOND * case.tight, _determined(case, truth.trajectory)
+    if other != "compiled":
+        rubs = case.scene is not None and frictional(case.scene) is not None
+        limit = OF_WITNESS * budget if case.general else math.inf
+        found = _witness(case, limit) if case.general and not rubs else ""
+        if isinstance(found, Trajectory):
+            return _Source(found, "Pinocchio with CVODE", WITNESS * case.tight, "only the scene", Tier.C)
+        run = _in_time(known, other, rtol, limit)
+        if not (why := _left_out(truth, run, case, rubs)):
+            return _Source(run, other, rtol, "only the equations of the mechanism", Tier.C, found)
+    run = _in_time(known, "compiled", rtol)
+    return _Source(run, "compiled", rtol, "equations, integrator and event location", Tier.D, why)
+
+
+def _until(case: Case, t: float) -> Case:
+    """Return a scene up to the last instant that is asked for, s; other cases as they are."""
+    return replace(case, t_end=min(max(t, SHORTEST * case.t_end), case.t_end)) if case.general else case
+
+
+def _determined(case: Case, first: Trajectory) -> Case:
+    """Return a scene up to where the law determines its motion: from there on no second source says anything of it."""
+    end = min(first.determined_until, first.unique_until)
+    return replace(case, t_end=end) if case.general and 0.0 < end < case.t_end else case
+
+
+def _in_time(case: Case, solver: str, rtol: float, limit: float = math.inf) -> Trajectory:
+    """A motion by another solver of the reference, as far as it gets in time, s: CVODE's equations are in Python."""
     from crossbody.engines import load
 
     for part in (SHARE, 1.0) if math.isfinite(limit) else (1.0,):
         shorter = replace(case, t_end=part * case.t_end)
         bound = {"time_limit": part * limit} if math.isfinite(limit) else {}
-        run = load("reference").prepare(shorter, solver, rtol=rtol, **bound).run()
+        run: Trajectory = load("reference").prepare(shorter, solver, rtol=rtol, **bound).run()
         if run.outcome is Outcome.TIME_LIMIT:
-            return f"CVODE would share only the equations, but take more than {limit:.0f} s"
+            break
     return run
+
+
+def _left_out(truth: Truth, second: Trajectory, case: Case, rubs: bool) -> str:
+    """Return why CVODE does not stand for the whole motion, and what it says all the same; nothing where it does.
+
+    One that is at another place before its time is over does stand for it: then either may be wrong.
+    """
+    end = float(second.t[-1])
+    if second.outcome is not Outcome.TIME_LIMIT:
+        other = rubs and not (second.outcome.ok or second.outcome is truth.trajectory.outcome)
+        return f"CVODE ends {second.outcome.value} at t = {end:.4g} s" if other else ""
+    off = _apart(replace(truth, trusted=end), second, case)[1]
+    if (off > PARTED).any():
+        return ""
+    said = "CVODE, which shares only the equations, takes longer than --budget allows"
+    return f"{said}: up to t = {end:.4g} s it is at most {np.max(off, initial=0.0):.1e} off"
 
 
 def _witness(case: Case, limit: float) -> Trajectory | str:
@@ -242,27 +296,30 @@ def _arbitrary(truth: Truth, second: Trajectory, case: Case) -> float:
     return math.inf
 
 
-def _growing(case: Case, truth: Trajectory, at: Callable[[Floats], Trajectory], limit: float) -> tuple[Floats, Floats]:
+def _growing(case: Case, truth: Trajectory, limit: float) -> tuple[Floats, Floats]:
     """Instants (n,), s, and by how much more than in free flight errors of the start have grown until then (n,).
 
     Of a scene, and of any case with other parameters than those that its limits are for.
 
-    Its velocities are put off, on its rows. A neighbour that gets less far, or takes longer than
-    a limit, s, tells of growth as far as it gets: limits are the stricter for what is not known.
+    Its velocities are put off, on its rows, and followed up to where the law determines them. A neighbour that gets
+    less far, or takes longer than a limit, s, tells of growth as far as it gets: limits are the stricter for what is
+    not known.
     """
     fastest = max(float(np.max(np.abs(truth.v), initial=0.0)), RESTS)  # what balances falls, however slowly
     if not (case.general or changed(case)) or not truth.outcome.ok or not fastest < math.inf:
         return np.array([0.0, case.t_end]), np.ones(2)
     from crossbody.engines.equations import system_of
 
-    rng, system, t = np.random.default_rng(0), system_of(case), np.linspace(0.0, case.t_end, INSTANTS)
-    held, exact, most = system.constraint(case.q0, case.v0)[0][~case.law.unilateral], at(t).q, np.ones(len(t))
+    rng, system = np.random.default_rng(0), system_of(case)
+    some = distinct(np.searchsorted(truth.t, np.linspace(0.0, float(truth.t[-1]), INSTANTS)))
+    t, exact, most, end = truth.t[some], truth.q[some], np.ones(len(some)), _determined(case, truth).t_end
+    held = system.constraint(case.q0, case.v0)[0][~case.law.unilateral]
     for _ in range(DIRECTIONS):
         way = rng.choice([-1.0, 1.0], size=len(case.v0))
         way -= np.linalg.lstsq(held, held @ way, rcond=None)[0] if len(held) else 0.0
         off = NUDGE * fastest
-        nudged = replace(case, v0=case.v0 + off * way)
-        run = motion(nudged, case.tight, samples=t, time_limit=limit)
+        nudged = replace(case, v0=case.v0 + off * way, t_end=end)
+        run = motion(nudged, case.tight, samples=t[t <= end], time_limit=limit)
         count = int(np.searchsorted(t, run.t[-1], side="right")) if len(run.t) else 0
         apart = np.zeros(len(t))
         apart[:count] = np.max(differences(run.q[:count], exact[:count], case.quaternions), axis=1)

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.impulse import away, cumulative, told, true_impulse, with_collisions
+from crossbody.reports.measuring.impulse import (
+    away,
+    before_stops,
+    cumulative,
+    held,
+    told,
+    true_impulse,
+    with_collisions,
+)
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
 
@@ -75,6 +83,8 @@ def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     if np.isnan(run.lam).any():
         return math.nan
+    stops = before_stops(run)
+    run, exact = held(run, stops), held(exact, stops)
     mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
     scale = float(np.max(np.abs(theirs), initial=0.0))
     least = idle(truth.trajectory) * case.t_end
@@ -86,7 +96,8 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
     Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time
     included. Releases are matched too, as lam jumps there: a sample on the wrong side would count for half
-    its step. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
+    its step. At the instant at which a slip stops its friction may have any direction: the sample before counts
+    there. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
     known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
     many; N s where only the run's does.
     """
@@ -95,6 +106,8 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     if np.isnan(run.lam).any():
         return math.nan
+    stops = before_stops(run)
+    run, exact = held(run, stops), held(exact, stops)
     theirs = true_impulse(run, exact, truth.trajectory)
     scale = float(np.max(np.abs(theirs), initial=0.0))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter, process_time
 from typing import Any, TypeVar
 
@@ -43,9 +45,12 @@ STUDY_S = 20.0
 OF_STUDIES, DEARER = 2.0, 3.0
 """Time that all runs of a study of a scene may take, in budgets, by what its own run took; one at
 a tight tolerance is taken to cost so many times as much."""
-FIRST, DEAR = 0.02, 12.0
-"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it
-is not begun unless its profile is asked for: engines that follow the law take their steps in Python."""
+FIRST, DEAR = 0.02, 4.0
+"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
+unless its profile is asked for: engines that follow the law take their steps in Python."""
+AHEAD, BEYOND = 0.05, 1.0
+"""Part of the time for which a truth is known by which a run goes on behind it, and the time, in budgets, that it may
+take from there to its horizon: nothing is compared there."""
 COMPILED = ("reference", "compiled")  # who follows what the truth has followed
 _OF_RUNS = {"profile": TEXT, "settings": Public("a mapping from names to values", lambda one: isinstance(one, Mapping))}
 _Kind = TypeVar("_Kind")
@@ -123,7 +128,8 @@ def run_case(
         watch.limited(label, limit)
         why = watch.lost(label)
         began = _clock()
-        entry = ended(case, pick, why) if why else _entry(case, pick, of_pick(asked, pick), reference, refine, budget)
+        made = partial(_entry, case, pick, of_pick(asked, pick), reference, refine, budget, truth.trusted)
+        entry = ended(case, pick, why) if why else made()
         own = _own(case, pick, entry, settings or {})
         entries.append(replace(entry, took_s=_clock() - began, asked=own))
     watch.unlimited()
@@ -167,14 +173,16 @@ def of_start(case: Case, why: str) -> Trajectory:
 
 
 def _entry(
-    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
+    known: float,
 ) -> Entry:  # fmt: skip
     """The run of one engine; whatever it throws is a row, and the others are judged."""
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
         refine = refine or judges_parts(case, pick.engine, pick.profile)
-        return _ran(case, pick, asked, reference, refine, budget)
+        run = partial(_ran, pick=pick, asked=asked, reference=reference, refine=refine, budget=budget, known=known)
+        return _as_far(case, pick, known, run)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
@@ -183,13 +191,48 @@ def _entry(
         return Entry(engine=pick.engine, profile=pick.profile, crashed=crash(error))
 
 
+def _as_far(case: Case, pick: Pick, known: float, run: Callable[..., Entry]) -> Entry:
+    """The run of one engine, not beyond the end of the truth where that costs too much: nothing is compared there.
+
+    Args:
+        case: the scene.
+        pick: the engine.
+        known: the end of the truth, s.
+        run: runs a case, unless what is left, so many times as long, is cheap (`_CheapError`).
+    """
+    short = ahead_of(case, known) if _bounded(case, pick) else case
+    try:
+        found = run(short, left=case.t_end / short.t_end - 1.0)
+    except _CheapError:
+        with suppress(CaseUnsupported):  # it may come to what takes long
+            return run(case)
+        found = run(short)
+    return found if short is case else replace(found, until=short.t_end)
+
+
+class _CheapError(Exception):
+    """What is left of a run costs little."""
+
+
+def ahead_of(case: Case, known: float) -> Case:
+    """Return a scene up to a little behind the instant, s, to which its truth is known; as it is if to the end."""
+    end = float(f"{(1.0 + AHEAD) * known:.2g}") if math.isfinite(known) else case.t_end
+    return replace(case, t_end=end) if case.general and end < case.t_end else case
+
+
+def _bounded(case: Case, pick: Pick) -> bool:
+    """Return whether a run is left out where it takes too long."""
+    return pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
+
+
 def _ran(
-    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float
+    case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
+    known: float, left: float = 0.0,
 ) -> Entry:  # fmt: skip
     most = DEAR * budget
     if pick.every and (dear := _dear(case, pick, asked, most)):
         raise CaseUnsupported(dear)
-    bounded = pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
+    bounded = _bounded(case, pick)
     prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
     shown = _of_engine(pick, "audit", prepared.audit(), Mapping, "a mapping")  # type: ignore[type-abstract]
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
@@ -208,8 +251,10 @@ def _ran(
     if bounded and natural.outcome is Outcome.TIME_LIMIT:
         raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
+    if natural.outcome.ok and 0.0 < left * took <= BEYOND * budget:
+        raise _CheapError
     run = _dense(case, pick, prepared, natural, asked)
-    studied = refine and natural.outcome.ok
+    studied, part = refine and natural.outcome.ok, ahead_of(case, known).t_end / case.t_end
     return Entry(
         engine=pick.engine,
         profile=pick.profile,
@@ -218,7 +263,9 @@ def _ran(
         run=run,
         clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled, cpu_s=took),
         audit=rows,
-        study=_study(case, pick, prepared, natural, run, took, OF_STUDIES * budget) if studied else None,
+        study=_study(ahead_of(case, known), pick, prepared, natural, run, took * part, OF_STUDIES * budget)
+        if studied
+        else None,
         hidden=hidden,
         own=law_of(prepared.follows) if refine and prepared.follows is not None else None,
     )
@@ -293,7 +340,8 @@ def _study(
 ) -> Study:  # fmt: skip
     """The other runs of an engine that tell the parts of its error; those of its model where its equations are known.
 
-    Where it reads the file by itself they are of the model that is built from the scene.
+    They go as far as the case, which may end before the runs that are known: where its truth does. Where it reads the
+    file by itself they are of the model that is built from the scene.
     """
     settings = prepared.settings
 
@@ -308,7 +356,7 @@ def _study(
 
     of_scene = {READER: "scene"} if settings.get(READER) == "file" else {}
     size = {name: float(settings[name]) for name in ("dt", "rtol") if name in settings}
-    samples = {"samples": np.array(judged.t)} if "samples" in settings else {}
+    samples = {"samples": np.array(judged.t[judged.t <= case.t_end])} if "samples" in settings else {}
     built = run(**of_scene, **size) if of_scene else None
     of_scene = {} if isinstance(built, str) else of_scene
     told: dict[str, Any] = {"why_built": built} if isinstance(built, str) else {"built": built}

@@ -8,6 +8,7 @@ import re
 import xml.etree.ElementTree as ET
 import zipfile
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,9 @@ from crossbody.reference import System, simulate
 from crossbody.reference.tree import mechanism
 from crossbody.reference.tree.table import tabulate
 from crossbody.reports.cli import cli
+from crossbody.reports.judging.run_verdicts import verdicts
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.metrics.position import scale_of
 from crossbody.reports.runs import choice, jobs
 
@@ -786,6 +790,22 @@ def test_a_run_that_seemed_cheap_and_is_not_is_ended(tmp_path: Path, monkeypatch
     assert ours.run is not None
     assert ours.run.outcome is Outcome.FINISHED
     assert all("Too expensive: it would take more than" in entry.skipped for entry in others)
+
+
+@pytest.mark.parametrize("dear", [True, False])
+def test_a_dear_run_ends_where_its_truth_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dear: bool) -> None:
+    """It is judged up to there, and says why not further; one that is cheap comes to its horizon."""
+    case = cases.from_file(write(tmp_path), "raised")
+    monkeypatch.setattr(jobs, "BEYOND", 0.0 if dear else 1.0)
+    truth = replace(truth_of(case), trusted=0.2 * case.t_end)
+    ours, cvode, *_ = jobs.run_case(case, choice.picks(["reference"]), truth=truth).entries
+    assert ours.run is not None
+    assert cvode.run is not None
+    assert ours.run.t[-1] == case.t_end
+    assert cvode.run.t[-1] == pytest.approx((0.21 if dear else 1.0) * case.t_end, rel=1e-2)
+    first = verdicts(case, cvode, truth, "")[0]
+    assert (first.metric, first.verdict, bool(first.why)) == ("finished", Word.WITHIN, dear)
+    assert verdicts(case, replace(cvode, until=np.inf), truth, "")[0].verdict == (Word.OUTSIDE if dear else Word.WITHIN)
 
 
 def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path) -> None:

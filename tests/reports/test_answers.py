@@ -70,3 +70,30 @@ def test_without_room_each_question_is_answered_alone(monkeypatch: pytest.Monkey
     assert sizes == [1]
     found(wide), found(wide)
     assert sizes == [1, len(wide)]
+
+
+def test_only_what_no_answer_has_is_integrated() -> None:
+    """Both sides of an event that is known from one alone are asked for anew, together."""
+    asked: list[list[float]] = []
+
+    def integrate(times: Floats) -> Trajectory:
+        asked.append(times.tolist())
+        return motion(times)
+
+    found = answers.Answers(integrate)
+    found(np.array([0.0, 1.0, JUMP]))
+    found(np.array([2.0, 4.0]))
+    mixed = found(np.array([0.0, 2.0, JUMP, JUMP, 4.0, 5.0]))
+    assert asked == [[0.0, 1.0, JUMP], [2.0, 4.0], [JUMP, JUMP, 5.0]]
+    assert np.array_equal(mixed.v, motion(mixed.t).v)
+    assert mixed.ledger is not None
+    assert np.array_equal(mixed.ledger.input, mixed.t)
+    found(np.array([1.0, JUMP, JUMP, 4.0]))
+    assert len(asked) == 3
+
+
+def test_a_motion_that_ends_is_told_as_far_as_it_gets() -> None:
+    found = answers.Answers(lambda times: motion(times[times <= JUMP]))
+    found(np.array([1.0, 2.0]))
+    assert found(np.array([1.0, 2.0, 2.5, 4.0])).t.tolist() == [1.0, 2.0, 2.5]
+    assert found(np.array([1.0, 5.0])).t.tolist() == [1.0]

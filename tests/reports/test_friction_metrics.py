@@ -292,3 +292,17 @@ def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_p
         value = measured(name, run, case, truth)
         assert value is not None
         assert value < 1e-9
+
+
+@pytest.mark.parametrize("name", ["lam_impulse", "lam_impulse_path"])
+def test_where_a_slip_stops_friction_may_have_any_direction(name: str) -> None:
+    """Slips that die out turn within nanoseconds: a sample there stood for half a step, of tens of newtons."""
+    own = engines.load("reference").prepare(CASE, "compiled").run()
+    truth = from_run(own, Tier.A, "itself")
+    (stop,) = (event.t for event in own.events if event.after == Mode.STICK)
+    before, lam = int(np.searchsorted(own.t, stop)), own.lam.copy()
+    assert own.t[before] == own.t[before + 1] == stop
+    lam[before, 1:] *= -1.0
+    assert (measured(name, replace(own, lam=lam), truth=truth) or 0.0) < 1e-9
+    lam[before - 1, 1:] *= -1.0
+    assert (measured(name, replace(own, lam=lam), truth=truth) or 0.0) > 1e-3

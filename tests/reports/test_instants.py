@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from friction_scenes import HALF, G, box_body, box_on_floor, pair, stack
+from hypothesis import given
+from hypothesis import strategies as st
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier, Trajectory
@@ -165,3 +167,15 @@ def test_a_guard_that_is_known_to_less_than_it_changes_leaves_an_instant_in_full
     part = size * abs(late) ** power / known
     wanted = abs(late) if abs(late) <= 1e-6 or part > 1.0 else 1e-6 * part
     assert off(from_run(rests, Tier.A, "itself"), 0.5, 0.5 + late, guard, known) == pytest.approx(wanted, rel=1e-6)
+
+
+@given(st.floats(1e-7, 1e-1), st.floats(0.0, 1e6), st.floats(1.0, 1e8))
+def test_an_event_is_no_further_off_than_by_its_instants(late: float, slope: float, grows: float) -> None:
+    """However much errors grow: what its guard makes of an instant may excuse it, and never makes it worse."""
+    times = np.linspace(0.0, 1.0, 11)
+    still = np.zeros((len(times), 1))
+    motion = Trajectory(
+        t=times, q=still, v=still, gap=still, lam=still, energy=np.zeros((len(times), 2)), mode=still.astype(np.int8)
+    )
+    truth = replace(from_run(motion, Tier.A, "itself"), grows=grows)
+    assert off(truth, 0.5, 0.5 + late, lambda run: slope * (0.5 - run.t), 1e-6) <= late * (1.0 + 1e-9)
