@@ -29,6 +29,7 @@ UNBOUNDED: Vector = (-math.inf, math.inf)
 WIDTHS = {"free": (7, 6), "ball": (4, 3), "slide": (1, 1), "hinge": (1, 1)}
 """Coordinates and velocities of every type of joint."""
 LARGEST = 10_000  # bodies of one scene
+ROUGHEST = 1e100  # coefficient of friction: the square of a much larger one is no number
 FLAT = 1e-6
 """Part of its length that is the least thickness of a hull: files have corners in single precision."""
 
@@ -291,9 +292,10 @@ class Pair(_Named):
 
 def _check_friction(part: Shape | Pair) -> None:
     """Check the coefficients of a shape or a pair: of two shapes the larger holds, which may hide a negative one."""
-    if not all(0.0 <= mu < math.inf for mu in part.friction):
+    if not all(0.0 <= mu <= ROUGHEST for mu in part.friction):
         raise SceneError(
-            f"{type(part).__name__} {part.name!r}: friction is {part.friction}; it must be at least 0 and finite."
+            f"{type(part).__name__} {part.name!r}: friction is {part.friction}; it must be at least 0 and at most "
+            f"{ROUGHEST:g}."
         )
 
 

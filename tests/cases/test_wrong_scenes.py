@@ -63,6 +63,7 @@ WRONG: list[tuple[type, dict[str, Any], str]] = [
     (Shape, {"type": "hull", "corners": [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]}, "lie in one plane"),
     (Shape, {"type": "hull", "corners": [(0.0, 0.0, math.inf)]}, "corner 0 is .* must be finite"),
     (Pair, {"dimension": 2}, "dimension is 2; valid: "),
+    (Pair, {"friction": (1e300, *[0.0] * 4)}, "friction is .* at most 1e.100"),
     (Pair, {"friction": (-0.1, *[0.0] * 4)}, "friction is .* at least 0"),
     (Shape, {"friction": (-0.5, 0.0, 0.0)}, "friction is .* at least 0"),
     (Loop, {"type": "glue"}, "type is 'glue'; valid: "),
