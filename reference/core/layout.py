@@ -41,7 +41,7 @@ OF_FRICTION = (
     "borne", "even", "carried", "known", "off_by", "course", "island", "packed", "calm", "spot",
     "begin_at", "end_at",
     "calm_place", "calm_size", "isle_unknowns", "isle_normals", "isle_rank", "isle_second", "isle_held", "isle_grown",
-    "remains", "pivots", "taken", "root_weight",
+    "remains", "pivots", "taken", "root_weight", "asked",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -432,7 +432,8 @@ class Work:
     pivots: Floats  # D,
     taken: Index  # which unknown each pivot is of,
     small: Floats2  # and factors of L^T L
-    root_weight: Floats
+    root_weight: Floats  # square roots of weights,
+    asked: Floats  # and what sticking rows are asked for where they are shared
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)

@@ -17,7 +17,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.complete import RANK, factor_normal, orthonormalise, solve_normal
 from crossbody.reference.core.layout import Work
-from crossbody.reference.kinds import Array
+from crossbody.reference.kinds import Array, Floats
 
 
 @compiled
@@ -112,64 +112,64 @@ def solve_full(s: Any, w: Work, k: int) -> None:
 
 @compiled
 def start_symmetric(s: Any, w: Work, k: int) -> None:
-    """Leave in w.press what the normal rows alone ask for by w.found, and in w.left what the sticking ones do then."""
-    n, o, first = s.unknowns, w.begin[k], w.isle_rank[k] - w.isle_second[k]
-    y = w.beside
-    for b in range(first):
-        y[b] = 0.0
-        for a in range(s.normals):
-            y[b] += w.ldl[o + b, a] * w.found[a]
+    """Leave in w.press what the normal rows alone ask for by w.found, and in w.asked what the sticking ones do then."""
+    n, count, o, first, second = s.unknowns, s.normals, w.begin[k], w.isle_rank[k] - w.isle_second[k], w.isle_second[k]
+    L, left, y = w.ldl[o : o + n], w.left, w.beside
+    _project(L, 0, first, 0, count, w.found, y)
     solve_normal(w.small[o : o + first], first, y)
-    for a in range(s.normals, n):
-        w.left[a - s.normals] = w.found[a]
+    for a in range(count, n):
+        left[a] = w.found[a]
     for b in range(first):
-        for a in range(s.normals, n):
-            w.left[a - s.normals] -= w.ldl[o + b, a] * y[b]
+        for a in range(count, n):
+            left[a] -= L[b, a] * y[b]
         y[b] /= w.pivots[o + b]
-    solve_normal(w.small[o : o + first], first, y)
-    _press(s, w, o, first, y, w.press)
+    _press(L, w.small[o : o + first], first, count, y, w.press)
+    _project(L, first, second, count, n, left, w.asked)
+    solve_normal(w.small[o + first : o + first + second], second, w.asked)
+    for b in range(second):
+        w.asked[b] /= w.pivots[o + first + b]
 
 
 @compiled
-def _press(s: Any, w: Work, o: int, first: int, y: Array, out: Array) -> None:
-    """Out := L1_n y."""
-    for a in range(s.normals):
+def _project(L: Floats, first: int, rank: int, low: int, high: int, x: Array, y: Array) -> None:
+    """Y := L^T x of `rank` columns from `first` on, in rows `low` to `high`."""
+    for b in range(rank):
+        total = 0.0
+        for a in range(low, high):
+            total += L[first + b, a] * x[a]
+        y[b] = total
+
+
+@compiled
+def _press(L: Floats, N: Floats, first: int, count: int, y: Array, out: Array) -> None:
+    """Out := L1_n N1^-1 y of the normal rows; y is overwritten."""
+    solve_normal(N, first, y)
+    for a in range(count):
         out[a] = 0.0
     for b in range(first):
-        for a in range(s.normals):
-            out[a] += w.ldl[o + b, a] * y[b]
+        for a in range(count):
+            out[a] += L[b, a] * y[b]
 
 
 @compiled
 def share_symmetric(s: Any, w: Work, k: int) -> None:
     """Solve for the sticking rows by w.weight, and for the normal ones beside them."""
-    n, o, first, second = s.unknowns, w.begin[k], w.isle_rank[k] - w.isle_second[k], w.isle_second[k]
-    sticking, y, Q = n - s.normals, w.beside, w.square
+    n, count, o, first, second = s.unknowns, s.normals, w.begin[k], w.isle_rank[k] - w.isle_second[k], w.isle_second[k]
+    L, Q, y, found, root = w.ldl[o : o + n], w.square, w.beside, w.found, w.root_weight
+    for a in range(n - count):
+        root[a] = np.sqrt(w.weight[a])
+        found[count + a] = 0.0
     for b in range(second):
-        y[b] = 0.0
-        for a in range(sticking):
-            y[b] += w.ldl[o + first + b, s.normals + a] * w.left[a]
-    solve_normal(w.small[o + first : o + first + second], second, y)
+        y[b] = w.asked[b]
+        for a in range(n - count):
+            Q[b, a] = L[first + b, count + a] * root[a]
+    orthonormalise(Q, second, n - count, y)
     for b in range(second):
-        y[b] /= w.pivots[o + first + b]
-    for a in range(sticking):
-        w.root_weight[a] = np.sqrt(w.weight[a])
-    for b in range(second):
-        for a in range(sticking):
-            Q[b, a] = w.ldl[o + first + b, s.normals + a] * w.root_weight[a]
-    orthonormalise(Q, second, sticking, y)
-    for a in range(sticking):
-        w.found[s.normals + a] = 0.0
-    for b in range(second):
-        for a in range(sticking):
-            w.found[s.normals + a] += Q[b, a] * y[b]
-    for a in range(sticking):
-        w.found[s.normals + a] *= w.root_weight[a]
-    for b in range(first):
-        y[b] = 0.0
-        for a in range(s.normals, n):
-            y[b] += w.ldl[o + b, a] * w.found[a]
-    solve_normal(w.small[o : o + first], first, y)
-    _press(s, w, o, first, y, w.found)
-    for a in range(s.normals):
-        w.found[a] = w.press[a] - w.found[a]
+        for a in range(n - count):
+            found[count + a] += Q[b, a] * y[b]
+    for a in range(n - count):
+        found[count + a] *= root[a]
+    _project(L, 0, first, count, n, found, y)
+    _press(L, w.small[o : o + first], first, count, y, found)
+    for a in range(count):
+        found[a] = w.press[a] - found[a]
