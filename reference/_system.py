@@ -291,9 +291,9 @@ class System:
     def _trees(self, spans: Index) -> Index:
         """Columns that each row may touch, widened to whole trees of what M couples."""
         first, last = np.arange(self.n), np.arange(1, self.n + 1)  # of the tree of every coordinate
-        for i in range(self.n):
-            if self.above[i] >= 0:
-                first[i] = first[self.above[i]]
+        for i, parent in enumerate(np.asarray(self.above).tolist()):
+            if parent >= 0:
+                first[i] = first[parent]
         np.maximum.at(last, first, np.arange(1, self.n + 1))
         wide = [(first[a:b].min(), last[first[a:b]].max()) for a, b in spans]
         whole_trees: Index = frozen("System", "trees", np.reshape(wide, spans.shape), spans.shape, np.int64)

@@ -51,9 +51,11 @@ def find(s: Any, m: Model, w: Work) -> None:
         for j in range(s.na):
             if w.island[j] >= 0 and w.slid_on[w.island[j]] == slides:
                 _pack(s, m, w, j, slides == 0)
-    for j in range(s.na):
+    for j in range(s.na):  # what stands outside of islands is zero from here on
         for c in range(s.na):
             w.gram[j, c] = 0.0
+        for c in range(s.n):
+            w.X[j, c] = 0.0
     s.held_calm = -1
 
 
