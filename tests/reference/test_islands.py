@@ -48,6 +48,10 @@ def agree(run: Any) -> int:
     whole, others, none = evaluated(run, together=True)
     assert none == 0
     assert np.abs(apart - whole).max() <= SAME * (1.0 + np.abs(whole).max())
+    q, v = np.split(run.work["y"], [run.system.nq])
+    H = run.system.constraint(q, v)[0][run.work["idx"][: len(forces)]]
+    pushes = np.linalg.solve(run.system.mass_matrix(q, v), H.T).T
+    assert np.abs(run.work["X"][: len(forces)] - pushes).max(initial=0.0) <= SAME * np.abs(pushes).max(initial=1.0)
     gram = np.diag(run.work["gram"])[: len(forces)]
     size = 1.0 + np.abs(others * gram).max(initial=0.0)
     assert np.abs((forces - others) * gram).max(initial=0.0) <= 1e3 * SAME * size
