@@ -102,7 +102,7 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
     """Call every kernel between guard cells; what it fills must be finite (an energy may be unknown)."""
     nan = np.nan
     given = {"t": 0.0, "q": q, "v": v, "u": np.zeros(s.inputs), "p": p, "idx": np.arange(s.nc), "na": s.nc}
-    inside = np.array([[a <= c < b for c in range(s.n)] for a, b in np.asarray(s.span)]).reshape(s.nc, s.n)
+    inside = np.array([[a <= c < b for c in range(s.n)] for a, b in np.asarray(s.trees)]).reshape(s.nc, s.n)
     rooms: dict[str, dict[str, Floats]] = {
         "dynamics": {"M": np.full((s.n, s.mass_block), nan), "f": np.full(s.n, nan), "w": np.zeros(s.scratch)},
         "gaps": {"h": np.full(s.nc, nan), "hd": np.full(s.nc, nan)},
@@ -122,7 +122,8 @@ def _check_filled(s: System, q: Floats, v: Floats, p: Floats) -> None:
                 raise SceneError(f"Kernel {name} gives {where} = {value[~np.isfinite(value)][0]} at {at}.")
         if name == "rows" and np.any(found["H"][~inside] != 0.0):
             where = entry("H", (found["H"] != 0.0) & ~inside)
-            raise KernelError(f"Kernel rows gives {where} outside System.span, which is {np.asarray(s.span).tolist()}.")
+            trees = np.asarray(s.trees).tolist()
+            raise KernelError(f"Kernel rows gives {where} outside System.span, which is {trees}.")
 
 
 def _near(first: State, v0: Floats, width: float, horizon: float, draw: Any) -> State:

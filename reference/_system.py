@@ -137,6 +137,7 @@ class System:
     friction: Floats = field(init=False)
     tangent: Index = field(init=False)
     tangents: Index = field(init=False)
+    trees: Index = field(init=False, repr=False)
     alpha: Floats = field(init=False)
     beta: Floats = field(init=False)
 
@@ -174,8 +175,10 @@ class System:
         put(self, "p", frozen("System", "p", np.concatenate([constants, state]), (None,)))
         put(self, "mass_block", self.mass_block or self.n)
         self._check_positions()
-        put(self, "span", self._spans(nc))
+        given = self._given_spans(nc)
         put(self, "above", self._parents())
+        put(self, "trees", self._trees(given))
+        put(self, "span", self._blocks(given))
         put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
         put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
         self._check_values()
@@ -270,16 +273,31 @@ class System:
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
         return full("System", name, getattr(self, name), nc, dtype)
 
-    def _spans(self, nc: int) -> Index:
-        """Columns that each row may touch, widened to whole blocks of the mass matrix."""
+    def _given_spans(self, nc: int) -> Index:
+        """Columns that each row may touch."""
         whole = [[0, self.n]] * nc if self.span is None else self.span
         spans: Index = frozen("System", "span", whole if nc else np.zeros((0, 2)), (nc, 2), np.int64)
         if np.any(spans[:, 0] < 0) or np.any(spans[:, 1] > self.n) or np.any(spans[:, 0] >= spans[:, 1]):
             raise SceneError(f"System.span is {spans.tolist()}; each row needs 0 <= first < last <= {self.n}.")
+        return spans
+
+    def _blocks(self, spans: Index) -> Index:
+        """Columns that each row may touch, widened to whole blocks of the mass matrix."""
         k = self.mass_block or self.n
         blocks = np.column_stack([spans[:, 0] // k * k, -(-spans[:, 1] // k) * k])
-        whole_blocks: Index = frozen("System", "span", blocks, (nc, 2), np.int64)
+        whole_blocks: Index = frozen("System", "span", blocks, spans.shape, np.int64)
         return whole_blocks
+
+    def _trees(self, spans: Index) -> Index:
+        """Columns that each row may touch, widened to whole trees of what M couples."""
+        first, last = np.arange(self.n), np.arange(1, self.n + 1)  # of the tree of every coordinate
+        for i, parent in enumerate(np.asarray(self.above).tolist()):
+            if parent >= 0:
+                first[i] = first[parent]
+        np.maximum.at(last, first, np.arange(1, self.n + 1))
+        wide = [(first[a:b].min(), last[first[a:b]].max()) for a, b in spans]
+        whole_trees: Index = frozen("System", "trees", np.reshape(wide, spans.shape), spans.shape, np.int64)
+        return whole_trees
 
     def _parents(self) -> Index:
         """Coordinates that M couples each one to, the nearest lower one; those before it in its block if not given."""

@@ -144,17 +144,29 @@ def _rate_and_drive(s: Any, m: Model, w: Work, on: float, j: int, v: Array) -> N
 
 
 @compiled
-def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
-    """Row j of M^-1 H^T and of G, as far as its band goes."""
+def push_of(s: Any, m: Model, w: Work, j: int) -> None:
+    """Row j of M^-1 H^T."""
     first, last = m.span[w.idx[j], 0], m.span[w.idx[j], 1]
     for c in range(first, last):
         w.X[j, c] = w.H[j, c]
     solve_mass(w.L, w.X[j], m.above, s.k, first, last)
+
+
+@compiled
+def entry_of(m: Model, w: Work, j: int, b: int) -> float:
+    """Entry of H M^-1 H^T of rows j, of which that of M^-1 H^T is known, and b."""
+    total, i, k = 0.0, w.idx[j], w.idx[b]
+    for c in range(max(m.span[i, 0], m.span[k, 0]), min(m.span[i, 1], m.span[k, 1])):
+        total += w.X[j, c] * w.H[b, c]
+    return float(total)
+
+
+@compiled
+def _schur_row(s: Any, m: Model, w: Work, j: int) -> None:
+    """Row j of M^-1 H^T and of G, as far as its band goes."""
+    push_of(s, m, w, j)
     for b in range(w.reach[j], j + 1):
-        total = 0.0
-        for c in range(max(first, m.span[w.idx[b], 0]), min(last, m.span[w.idx[b], 1])):
-            total += w.X[j, c] * w.H[b, c]
-        w.G[j, b] = total
+        w.G[j, b] = entry_of(m, w, j, b)
 
 
 @compiled
@@ -169,7 +181,7 @@ def _schur_at_once(s: Any, m: Model, w: Work) -> None:
         for c in range(s.n):
             right[c, j] = w.H[j, c] if first <= c < last else 0.0
             solved[c, j] = right[c, j]
-    solve_columns(w.L, solved, m.above, s.n, na)
+    solve_columns(w.L, solved, m.above, 0, 0, s.n, na)
     for j in range(na):
         for b in range(j + 1):
             G[j, b] = 0.0
@@ -192,12 +204,12 @@ def assemble(rows: Any, s: Any, m: Model, w: Work, on: float, t: float, q: Array
     rows(t, q, v, m.p, w.w, w.idx, na, w.H, w.ha, w.Hdv)
     for j in range(na):
         _rate_and_drive(s, m, w, on, j, v)
-        if not at_once:
+        if not (at_once or s.frictional):
             _schur_row(s, m, w, j)
+    if s.frictional:  # its rows are coupled by islands
+        return int(ask(FACTOR, s, m, w, np.int64(on > 0.0)))
     if at_once:
         _schur_at_once(s, m, w)
-    if s.frictional:
-        return int(ask(FACTOR, s, m, w, np.int64(on > 0.0)))
     s.dependent = factor_schur(w.G, na, w.reach, w.idx, w.shares)
     return int(s.dependent < 0)
 

@@ -88,21 +88,31 @@ def _subtract_row(X: Floats, a: int, part: float, b: int, count: int) -> None:
 
 
 @compiled
-def solve_columns(L: Floats, X: Floats, above: Index, n: int, count: int) -> None:
-    """X := M^-1 X, in place, for the first `count` columns of X and a mass matrix that is one block."""
+def solve_columns(L: Floats, X: Floats, above: Index, first: int, shift: int, n: int, count: int) -> None:
+    """X := M^-1 X, in place, for `count` columns of X, of which row 0 belongs to coordinate `first`.
+
+    Args:
+        L: factors of M.
+        X: right-hand sides, overwritten.
+        above: nearest lower coordinate that M couples each one to.
+        first: first of the coordinates, which are whole trees in one block.
+        shift: which one of its block that is.
+        n: how many coordinates.
+        count: how many columns.
+    """
     for i in range(n - 1, -1, -1):
-        c = above[i]
+        c = above[first + i] - first
         while c >= 0:
-            _subtract_row(X, c, L[i, c], i, count)
-            c = above[c]
+            _subtract_row(X, c, L[first + i, shift + c], i, count)
+            c = above[first + c] - first
     for i in range(n):
-        part = L[i, i]
+        part = L[first + i, shift + i]
         for j in range(count):
             X[i, j] *= part
-        c = above[i]
+        c = above[first + i] - first
         while c >= 0:
-            _subtract_row(X, i, L[i, c], c, count)
-            c = above[c]
+            _subtract_row(X, i, L[first + i, shift + c], c, count)
+            c = above[first + c] - first
 
 
 @compiled

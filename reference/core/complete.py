@@ -62,14 +62,19 @@ def largest_left(A: Floats, rank: int, n: int) -> float:
 
 
 @compiled
-def _solve_normal(B: Floats, n: int, x: Array) -> None:
-    """X := B^-1 x of a symmetric positive definite B, which is overwritten by its Cholesky factor."""
+def factor_normal(B: Floats, n: int) -> None:
+    """Overwrite a symmetric positive definite B, of which the lower triangle is given, by its Cholesky factor."""
     for i in range(n):
         for j in range(i + 1):
             total = B[i, j]
             for c in range(j):
                 total -= B[i, c] * B[j, c]
             B[i, j] = np.sqrt(total) if i == j else total / B[j, j]
+
+
+@compiled
+def solve_normal(B: Floats, n: int, x: Array) -> None:
+    """X := B^-1 x from the factor of `factor_normal`."""
     for i in range(n):
         for c in range(i):
             x[i] -= B[i, c] * x[c]
@@ -115,7 +120,8 @@ def solve_complete(
         for c in range(a + 1, n):
             total += A[c, a] * y[c]
         y[a] = total
-    _solve_normal(B, rank, y)
+    factor_normal(B, rank)
+    solve_normal(B, rank, y)
     _least_norm(A, n, rank, across, weight, B, y)
     for c in range(n):
         total = 0.0
@@ -126,7 +132,7 @@ def solve_complete(
 
 @compiled
 def _least_norm(A: Floats, n: int, rank: int, across: Index, weight: Array, Q: Floats, y: Array) -> None:
-    """Leave x of U x = y with the least sum x^2 / W as sqrt(W) Q^T y, by Gram and Schmidt, twice, on sqrt(W) U^T.
+    """Leave x of U x = y with the least sum x^2 / W as sqrt(W) Q^T y, with the rows of U sqrt(W) made orthonormal in Q.
 
     The weights reach over twelve decades: the normal equations U W U^T have no digit for the lightest, and once leaves
     in what is light rounding of what is heavy.
@@ -134,6 +140,13 @@ def _least_norm(A: Floats, n: int, rank: int, across: Index, weight: Array, Q: F
     for a in range(rank):
         for c in range(n):
             Q[a, c] = A[a, c] * np.sqrt(weight[across[c]]) if c >= a else 0.0
+    orthonormalise(Q, rank, n, y)
+
+
+@compiled
+def orthonormalise(Q: Floats, rank: int, n: int, y: Array) -> None:
+    """Make `rank` rows of Q orthonormal by Gram and Schmidt, twice, y with them: Q x = y has the same solutions."""
+    for a in range(rank):
         for _ in range(2):
             for b in range(a):
                 along = 0.0

@@ -130,6 +130,7 @@ def enter(s: Any, m: Model, w: Work, mode: Bytes) -> None:
 
     The next slip of a contact that does not slide counts from what its velocity is then.
     """
+    s.islands = -1
     for i in range(s.nc):
         w.slides[i] = 0
     for i in range(s.nc):

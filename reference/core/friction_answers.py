@@ -10,7 +10,6 @@ from crossbody.reference.core import (
     coulomb,
     jams,
     loops,
-    mode_set,
     slips,
     sticking,
     stops,
@@ -88,7 +87,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     if what == SOLVE:
         coulomb.solve(s, m, w, w.r, w.la)
         if s.dependent_rows > 0:
-            s.contradiction = mode_set.contradiction(s, w, w.r, w.la)
+            s.contradiction = coulomb.contradiction(s, m, w, w.la)
         if s.loops:
             loops.complete(s, m, w, w.r, w.la, True)
     elif what == RESPOND:

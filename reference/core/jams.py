@@ -89,7 +89,7 @@ def determinant(s: Any, m: Model, w: Work, j: int) -> float:
     place together press in turn, ever faster.
     """
     _reach(s, m, w, j)
-    if s.dependent_rows == 0:
+    if s.short == 0:
         for a in range(s.unknowns):
             w.seen[a] = not w.reached[w.unknown[w.down[a]]]
         return _signed_product(w.matrix, s.unknowns, w.down, w.across, w.seen) - JAMMED

@@ -38,7 +38,10 @@ OF_FRICTION = (
     "state", "wants", "begins", "since", "bare", "excess", "unknown", "size", "down", "across", "reached", "among",
     "seen", "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated",
     "turn_by", "bent", "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
-    "borne", "even", "carried", "known", "off_by", "course",
+    "borne", "even", "carried", "known", "off_by", "course", "island", "packed", "calm", "spot",
+    "begin_at", "end_at",
+    "calm_place", "calm_size", "isle_unknowns", "isle_normals", "isle_rank", "isle_second", "isle_held", "isle_grown",
+    "remains", "pivots", "taken", "root_weight", "asked",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -148,6 +151,13 @@ STATE = np.dtype(
         ("normals", "i8"),  # and how many are no sticking rows
         ("rank", "i8"),
         ("dependent_rows", "i8"),
+        ("short", "i8"),  # of these, rows of the system that is solved
+        ("calm_dependent", "i8"),  # and those of calm islands
+        ("islands", "i8"),  # of rows in contact, -1 if they have not been looked for since rows were listed,
+        ("calm", "i8"),  # of which so many have nothing that slides,
+        ("island", "i8"),  # and the one whose system is taken, -1 for the rest
+        ("held_calm", "i8"),  # unknowns of calm islands when modes were decided
+        ("calm_growth", "f8"),
         ("closed", "i8"),  # rows of loops that were eliminated before
         ("rank_first", "i8"),
         ("rank_second", "i8"),
@@ -208,7 +218,8 @@ class Model:
     beta: Floats2  # (nc, 3) the fast constants; a0 = 0 where the row has none
     unilateral: Bytes
     follows: Index  # the row whose activity this row shares; -1 for none
-    span: Index2  # (nc, 2) first column, and one past the last, of each row of H
+    span: Index2  # (nc, 2) first column, and one past the last, of each row of H, in whole blocks of M,
+    trees: Index2  # and in whole trees of what M couples
     above: Index  # nearest lower coordinate that M couples each one to; -1 for none
     friction: Floats  # (nc,) coefficient of each normal row; of one with dry friction of its own the bound itself
     tangent: Index  # (nc,) its first tangential row, of one with dry friction itself,
@@ -399,6 +410,30 @@ class Work:
     carried: Floats  # (nc,) what a tangential row is asked for that nothing can hold
     led: Floats2  # L^-1 G of these and all others, by columns,
     drawn: Floats  # and L^-1 of their right-hand sides
+    root: Index  # (n,) by coordinate: a lower one that rows in contact let it move with
+    slid_on: Bytes  # (n,) whether anything slides in the island of a coordinate
+    island: Index  # (nc,) by place: the lowest coordinate of its island
+    packed: Index  # places by islands,
+    begin: Index  # (nc + 1,) where each begins,
+    begin_at: Index  # its first coordinate,
+    end_at: Index  # and one past the last,
+    calm: Bytes  # and by place whether it is one in which nothing slides
+    spot: Index  # by place of a normal row: where it stands among the unknowns of its system
+    calm_place: Index  # places of the unknowns of calm islands,
+    calm_size: Floats  # and their sizes
+    isle_unknowns: Index  # by calm island: how many unknowns it has,
+    isle_normals: Index  # that are no sticking rows,
+    isle_rank: Index  # that are independent,
+    isle_second: Index  # and sticking ones that are,
+    isle_held: Index  # when modes were decided,
+    isle_grown: Floats  # and from which pivot on that is decided anew
+    remains: Floats  # what is left of a diagonal
+    ldl: Floats2  # L of A = L D L^T of calm islands, by columns,
+    pivots: Floats  # D,
+    taken: Index  # which unknown each pivot is of,
+    small: Floats2  # and factors of L^T L
+    root_weight: Floats  # square roots of weights,
+    asked: Floats  # and what sticking rows are asked for where they are shared
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)
@@ -433,7 +468,10 @@ def workspace(
         **dict.fromkeys(("guard", "guard_hit"), (ng,)),
         "guards": (NODES, ng), "discrete": (nd,), "sets": (SETS * frictional, nc), "cones": (NODES * frictional, nc),
         **dict.fromkeys(OF_FRICTION, (sliding,)),
-        **dict.fromkeys(("matrix", "first", "second", "held", "square", "turns", "closing", "led"), (sliding, sliding)),
+        **dict.fromkeys(("root", "slid_on"), (frictional * n,)), "begin": (sliding + 1,),
+        **dict.fromkeys(
+            ("matrix", "first", "second", "held", "square", "turns", "closing", "led", "ldl", "small"),
+            (sliding, sliding)),
     }  # fmt: skip
     types = {"Index": np.int64, "Bytes": np.int8}
     return {

@@ -14,6 +14,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.core.complete import factor_complete, solve_complete
 from crossbody.reference.core.friction import is_dry
 from crossbody.reference.core.layout import Model, Work
+from crossbody.reference.core.symmetric import share_symmetric, start_symmetric
 from crossbody.reference.core.unknowns import fill
 
 LIGHT = 1e-12  # part of the largest load at a contact, below which it counts as that
@@ -51,8 +52,18 @@ def factor_in_turn(s: Any, m: Model, w: Work, most: int) -> None:
 
 
 @compiled
+def sticks_depend(s: Any, w: Work) -> bool:
+    """Whether sticking rows of the system that is solved depend on others, so that their loads are shared."""
+    independent = w.isle_second[s.island] if s.island >= 0 else s.rank_second
+    return bool(independent < s.unknowns - s.normals)
+
+
+@compiled
 def _start(s: Any, w: Work) -> None:
     """Leave in w.press what the normal rows alone ask for by w.found, and in w.left what the sticking ones do then."""
+    if s.island >= 0:
+        start_symmetric(s, w, s.island)
+        return
     count, sticking = s.normals, s.unknowns - s.normals
     for a in range(count):
         w.even[a] = 1.0
@@ -70,7 +81,7 @@ def _start(s: Any, w: Work) -> None:
 def solve_in_turn(s: Any, m: Model, w: Work) -> None:
     """Solve for w.found the normal rows, and in their null space the sticking ones, by loads that suit these."""
     _start(s, w)
-    for _ in range(SHARINGS if s.rank_second < s.unknowns - s.normals else 1):
+    for _ in range(SHARINGS if sticks_depend(s, w) else 1):
         _weigh(s, m, w)
         _share(s, w)
 
@@ -89,6 +100,9 @@ def refine(s: Any, w: Work) -> None:
 @compiled
 def _share(s: Any, w: Work) -> None:
     """Solve for the sticking rows by w.weight, and for the normal ones beside them."""
+    if s.island >= 0:
+        share_symmetric(s, w, s.island)
+        return
     count, sticking = s.normals, s.unknowns - s.normals
     for a in range(sticking):
         w.found[count + a] = w.left[a]
@@ -116,7 +130,7 @@ def spread(s: Any, m: Model, w: Work) -> None:
         for a in range(sticking):  # bounds, and parts of them
             w.left2[a] = w.weight[a] / w.size[count + a] ** 2
             square = 0.0
-            for c in range(sticking):
+            for c in range(max(a - 1, 0), min(a + 2, sticking)):  # a contact's rows stand side by side
                 if m.follows[w.idx[w.unknown[count + c]]] == m.follows[w.idx[w.unknown[count + a]]]:
                     square += (w.found[count + c] / w.size[count + c]) ** 2
             unbounded = m.friction[m.follows[w.idx[w.unknown[count + a]]]] == np.inf
@@ -146,12 +160,11 @@ def _weigh(s: Any, m: Model, w: Work) -> None:
     count, most = s.normals, 0.0
     for a in range(s.unknowns - count):
         n = m.follows[w.idx[w.unknown[count + a]]]
-        load = 0.0
-        for b in range(count):
-            if w.unknown[b] == w.listed[n]:
-                load = m.friction[n] * w.found[b] / w.size[b] if m.friction[n] < np.inf else w.found[b] / w.size[b]
         if is_dry(m, n):
             load = m.friction[n]
+        else:
+            b = w.spot[w.listed[n]]
+            load = m.friction[n] * w.found[b] / w.size[b] if m.friction[n] < np.inf else w.found[b] / w.size[b]
         w.weight[a] = max(load, 0.0) * w.size[count + a] ** 2
         most = max(most, w.weight[a])
     for a in range(s.unknowns - count):

@@ -123,13 +123,6 @@ def exceed(s: Any, w: Work, r: Array, la: Array) -> None:
 
 
 @compiled
-def contradiction(s: Any, w: Work, r: Array, la: Array) -> float:
-    """By how many times what is allowed the normal rows that are solved for are off r under the multipliers la."""
-    exceed(s, w, r, la)
-    return apart(s, w)
-
-
-@compiled
 def apart(s: Any, w: Work) -> float:
     """By how many times what is allowed the normal rows that are solved for move otherwise than they must: w.excess."""
     allow(s, w, w.y[: s.nq], w.y[s.nq :])

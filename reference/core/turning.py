@@ -64,7 +64,7 @@ def turning_rate(s: Any, m: Model, w: Work, begun: bool) -> float:
             w.turning[count] = i
             count += 1
             _bend(s, m, w, i)
-    if count > 0 and s.dependent_rows > 0:
+    if count > 0 and s.short > 0:
         factor_as_held(s, m, w)  # its place is used by others
     for b in range(count):
         turns = turn_part(s, m, w, w.turning[b])
@@ -85,7 +85,7 @@ def turn_part(s: Any, m: Model, w: Work, i: int) -> bool:
     """
     if not _bend(s, m, w, i):
         return False
-    if s.dependent_rows > 0:
+    if s.short > 0:
         _turn_dependent(s, m, w, w.listed[m.tangent[i]])
         return True
     c = w.listed[m.tangent[i]]

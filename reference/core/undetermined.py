@@ -118,7 +118,7 @@ def _fastest(s: Any, m: Model, w: Work) -> float:
 def _take_shares(s: Any, m: Model, w: Work) -> None:
     """Leave in w.open_rate by how much v' of two shares may differ, for the rows last factored."""
     w.open_rate[:] = 0.0
-    if s.na > 0 and s.dependent_rows > 0:
+    if s.na > 0 and s.short > 0:
         s.spent_factors = 1
         fill(s, m, w)
         rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across, s.unknowns)

@@ -24,22 +24,29 @@ from crossbody.reference.core.loops import bears_nothing, is_loop
 
 
 @compiled
-def _is_out(m: Model, w: Work, j: int) -> bool:
+def is_out(m: Model, w: Work, j: int) -> bool:
     """Whether the row in place j is one of loops, or one that they hold."""
     return is_loop(m, w.idx[j]) or bears_nothing(m, w, j)
 
 
 @compiled
 def list_unknowns(s: Any, m: Model, w: Work) -> int:
-    """List in w.unknown the places that are solved for, sticking tangential rows last; how many are not of those."""
+    """List in w.unknown the places that are solved for, sticking tangential rows last; how many are not of those.
+
+    Islands that are calm are left out.
+    """
     count = 0
     for j in range(s.na):
-        if not w.off[w.idx[j]] and not is_tangent(m, w.idx[j]) and not (s.loops and _is_out(m, w, j)):
-            w.unknown[count] = j
+        if s.calm and w.calm[j]:
+            continue
+        if not w.off[w.idx[j]] and not is_tangent(m, w.idx[j]) and not (s.loops and is_out(m, w, j)):
+            w.unknown[count], w.spot[j] = j, count
             count += 1
     normals = count
     for j in range(s.na):
         i = w.idx[j]
+        if s.calm and w.calm[j]:
+            continue
         if not w.off[i] and is_tangent(m, i) and not w.slides[i] and not bears_nothing(m, w, j):
             w.unknown[count] = j
             count += 1

@@ -20,7 +20,7 @@ from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._emerging import settled
-from crossbody.reference.linear._point import NO_ROWS, Point, directions, turning
+from crossbody.reference.linear._point import NO_ROWS, Point, directions, gaps, turning
 from crossbody.reference.linear._rubbing import NoDirectionError
 from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, NOISE, STILL, Slipping
 from crossbody.reference.linear._slipping import AS_ONE as SWITCH_AS_ONE
@@ -40,7 +40,7 @@ from crossbody.reference.linear._variation import (
 from crossbody.reference.linear.linearisation import point
 
 GRAZING = 1e-12  # part of the terms of g_x f below which an event is only grazed
-
+TOUCHED = 10.0  # times the tolerance, of the largest coordinate, to which a gap is known: one as deep is only grazed
 
 AS_ONE = (
     "sensitivity: several rows collide simultaneously; a deviation separates them, and the motion then depends on "
@@ -156,8 +156,13 @@ def sensitivity(
 
 def _placed(here: Point, t: float, y: Floats) -> Point:
     """The point at a time and a state."""
+    return settled(_at(here, t, y))
+
+
+def _at(here: Point, t: float, y: Floats) -> Point:
+    """The point at a time and a state, with the rows in contact as they are."""
     nq = here.system.nq
-    return settled(replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + here.system.n].copy()))
+    return replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + here.system.n].copy())
 
 
 def _same(end: Floats, motion: Floats) -> bool:
@@ -202,16 +207,94 @@ class _Walk:
         if rubs and not (run.events and run.events[0].t == 0.0):
             self.x[self.at.system.nq :] = self.slipping.hold(self._here(0.0), self.S)
         for t, group in groupby(run.events, key=lambda event: event.t):
-            if not self._smooth(now, t):
+            if not (self._begins(now, t) and self._smooth(now, t)):
                 return Outcome.ILL_POSED
             now, events = t, list(group)
-            for piece in [events] if rubs else _pieces(events):
+            if (row := self._only_touches(events)) is not None:
+                self.message = f"The gap of row {row} is only grazed at t = {t:.9g} s."
+                return Outcome.ILL_POSED
+            for piece in [events] if rubs else _pieces(self._lasting(events)):
                 if not (self._switch(piece) if rubs else self._event(piece)):
                     self.message = f"The event of row {piece[0].contact} at t = {t:.9g} s is only grazed."
                     return Outcome.ILL_POSED
-        if not self._smooth(now, t_end):
+        if not (self._begins(now, t_end) and self._smooth(now, t_end)):
             return Outcome.ILL_POSED
         return Outcome.FINISHED if np.isfinite(self.S).all() else Outcome.NOT_FINITE
+
+    def _lasting(self, group: list[Event]) -> list[Event]:
+        """Events of one instant without those of rows that touch and let go again there: nothing has pressed."""
+        through = set[int]()
+        for row in {e.contact for e in group}:
+            own = [e for e in group if e.contact == row]
+            modes = own[0].before, own[-1].after
+            if not any(mode in ACTIVE for mode in modes) and all(e.after is not Mode.COLLISION for e in own):
+                through.add(row)
+                self.modes[row] = int(modes[1])
+        return [e for e in group if e.contact not in through]
+
+    def _begins(self, start: float, end: float) -> bool:
+        """Whether no event is grazed where the motion starts; arcs that begin later do so at an event that is not."""
+        if start > 0.0 or not end > start:
+            return True
+        here = self._here(0.0)
+        for i in self._open():
+            if self._grazes(here, i):
+                self.message = f"The gap of row {i} is only grazed at the start, t = 0 s."
+                return False
+        for i, left, _ in self.slipping.watches(here):
+            if i not in here.sliding and not left(here) > GRAZED:
+                self.message = f"Row {i}, which has friction, is at its bound at the start, t = 0 s: it is only grazed."
+                return False
+        return True
+
+    def _open(self) -> list[int]:
+        """Rows with a gap of their own that are out of contact."""
+        system = self.at.system
+        own = (np.asarray(system.unilateral) != 0) & (np.asarray(system.follows) < 0)
+        return [i for i in np.flatnonzero(own).tolist() if self.modes[i] not in ACTIVE]
+
+    @property
+    def known(self) -> float:
+        """To what a gap is known, as far as the tolerance tells."""
+        return TOUCHED * self.rtol * float(np.abs(self.run.q).max(initial=0.0))
+
+    def _grazes(self, here: Point, i: int) -> bool:
+        """Whether row i, out of contact, has come no deeper than its gap is known where that is least: it turns away.
+
+        With the gap h, its rate and its acceleration a > 0 it is least at h - h'^2/(2 a).
+        """
+        n = self.at.system.n
+        h, rate = (values[i] for values in np.split(gaps(here, here.q, here.v), 2))
+        turns = float(gap_gradient(here, self.over, i, rate=True)[: 2 * n] @ rates(here))
+        return bool(turns > 0.0 and abs(h) <= self.known and rate * rate <= 2.0 * turns * self.known)
+
+    def _only_touches(self, group: list[Event]) -> int | None:
+        """The row of an event that touches no deeper than its gap is known; None if none does."""
+        for e in group if group[0].t > 0.0 else ():
+            own = np.asarray(self.at.system.follows)[e.contact] < 0
+            if e.before is Mode.FREE and own and self._grazes(self._here(e.t, "left"), e.contact):
+                return e.contact
+        return None
+
+    def _closest(self) -> list[tuple[int, Any]]:
+        """Rows out of contact, and for `scipy.integrate.solve_ivp` the rate of each gap, which rises where it is least.
+
+        All are computed at once where the first one is asked for.
+        """
+        nc, at, rates_then = self.at.system.nc, math.nan, np.zeros(self.at.system.nc)
+
+        def follow(i: int) -> Any:
+            def rate(t: float, y: Floats) -> float:
+                nonlocal at
+                if t != at:
+                    moved, at = _at(self.at, t, y), t
+                    rates_then[:] = gaps(moved, moved.q, moved.v)[nc:]
+                return float(rates_then[i])
+
+            rate.terminal, rate.direction = False, 1.0  # type: ignore[attr-defined]
+            return rate
+
+        return [(i, follow(i)) for i in self._open()]
 
     def _here(self, t: float, side: str = "right") -> Point:
         """The state at t with the rows and constants of the present modes; slips as the motion has them beside it."""
@@ -240,23 +323,29 @@ class _Walk:
         while end > start:
             here = self._here(start)
             ends, stiff = self.slipping.turns(here)
-            watched = self.slipping.watches(here)
+            watched, near = self.slipping.watches(here), self._closest()
             y, self.refusal = np.concatenate([self.x, self.S.ravel()]), None
             size = np.concatenate([np.ones(len(self.x)), np.full(self.S.size, np.abs(self.S).max())])
             how: Any = {"method": "Radau", "jac": self._jacobian(here)} if stiff else {"method": "DOP853"}
             done: Any = solve_ivp(
                 self._rate(here), (start, end), y, rtol=self.rtol, atol=1e-3 * self.rtol * size,
-                events=[*(slope for _, slope in watched), *ends], **how,
+                events=[*(slope for *_, slope in watched), *(rate for _, rate in near), *ends], **how,
             )  # fmt: skip
             if done.status < 0:
                 if self.refusal is not None:
                     raise self.refusal
                 self.message = f"The derivative was lost at t = {done.t[-1]:.9g} s: {done.message}"
                 return False
-            for (left, _), times, states in zip(watched, done.t_events or (), done.y_events or (), strict=False):
+            for (i, left, _), times, states in zip(watched, done.t_events or (), done.y_events or (), strict=False):
                 for t, state in zip(times, states, strict=True):
                     if t - start > EDGE * (end - start) and not left(_placed(here, t, state)) > GRAZED:
-                        self.message = f"An event of a contact with friction is grazed at t = {t:.9g} s."
+                        self.message = f"An event of row {i}, which has friction, is grazed at t = {t:.9g} s."
+                        return False
+            found = zip(done.t_events or (), done.y_events or (), strict=True)
+            for (i, _), (times, states) in zip(near, list(found)[len(watched) :], strict=False):
+                for t, state in zip(times, states, strict=True):
+                    if t - start > EDGE * (end - start) and self._grazes(_at(here, t, state), i):
+                        self.message = f"The gap of row {i} is only grazed at t = {t:.9g} s."
                         return False
             width, start = len(self.x), float(done.t[-1])
             self.x, self.S = done.y[:width, -1].copy(), done.y[width:, -1].reshape(self.S.shape).copy()

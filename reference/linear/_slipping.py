@@ -150,14 +150,14 @@ class Slipping:
         crossed.terminal, crossed.direction = True, way  # type: ignore[attr-defined]
         return crossed
 
-    def watches(self, here: Point) -> list[tuple[Callable[[Point], float], Any]]:
-        """How far every contact is from its next event, as a part of what may be, and where that is least."""
-        found = list[tuple[Callable[[Point], float], Any]]()
+    def watches(self, here: Point) -> list[tuple[int, Callable[[Point], float], Any]]:
+        """Contacts; how far each is from its next event, as a part of what may be, and where that is least."""
+        found = list[tuple[int, Callable[[Point], float], Any]]()
         for i in np.flatnonzero(np.asarray(self.system.tangents)).tolist():
             if i in here.sliding:
-                found.append(self._watch(here, lambda at, i=i: self._slip_left(at, i)))  # type: ignore[misc]
+                found.append((i, *self._watch(here, lambda at, i=i: self._slip_left(at, i))))  # type: ignore[misc]
             elif len(here.tangents(i)) and not self._shares(here, i):
-                found.append(self._watch(here, lambda at, i=i: self._cone_left(at, i)))  # type: ignore[misc]
+                found.append((i, *self._watch(here, lambda at, i=i: self._cone_left(at, i))))  # type: ignore[misc]
         return found
 
     def _watch(self, here: Point, left: Callable[[Point], tuple[float, float]]) -> tuple[Callable[[Point], float], Any]:

@@ -19,7 +19,7 @@ from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachin
 from crossbody.reference.sundials.run import CAUTION, SundialsRun
 from crossbody.reference.sundials.solvers import CVODE
 
-APART, APART_PART = 1e-7, 0.1  # of positions, and part of a slip without a direction: steps of differences
+APART, APART_PART = 1e-7, 1e-4  # of positions, and part of a slip without a direction: steps of differences
 RESOLVED = 64.0 * float(np.finfo(np.float64).eps)  # part of a velocity by which such a step differs from none
 ACCOUNTED = 0.3  # part of the solver's tolerance where an account is kept: the work of forces that change their ways
 STIFF = 10.0  # times the fastest pole of the rows
@@ -71,7 +71,12 @@ class SlidingArc(DenseStep):
             yp[self.ny :] = run.equations.powers(t, q, v, lam)
 
     def _jacobian(self, t: float, y: Floats, yp: Floats, J: Floats2) -> None:
-        """Differences over velocities that are small beside slips without a direction: the library's are not."""
+        """Differences over velocities that are small beside slips without a direction: the library's are not.
+
+        By far: a direction that turns by an angle loses its square along itself, which over a step of a tenth stands
+        as a rate of thousands of thousands, and Newton's method takes slips that begin to stand. By no more than that:
+        a slip is a difference of velocities that are rounded.
+        """
         moved, slopes, small = np.array(y), np.empty(len(y)), self.run.friction.small
         J[:] = 0.0
         for k in range(self.ny):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -9,17 +10,17 @@ import numpy as np
 
 from crossbody.cases import Law
 from crossbody.cases.control import Control
-from crossbody.cases.scene import Scene
+from crossbody.cases.scene import Body, Scene
 from crossbody.cases.scene_contacts import WAYS, contacts, rows_of
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
 from crossbody.reference._redundant import ranked
-from crossbody.reference.kinds import Floats
+from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.tree import layout
 from crossbody.reference.tree.mechanism import velocity
 from crossbody.reference.tree.quantities import KERNELS, row_kernels
 from crossbody.reference.tree.switches import switching_kernels
-from crossbody.reference.tree.table import dof_parents, tabulate
+from crossbody.reference.tree.table import Table, dof_parents, tabulate
 from crossbody.reference.tree.traced import compiled_sweeps
 
 
@@ -47,6 +48,33 @@ def _friction(scene: Scene, nc: int) -> dict[str, Any]:
         mu[row : row + count] = contact.friction
         normal, row = normal + contact.places, row + count
     return {"follows": follows, "mu": mu, "friction_loss": loss}
+
+
+def _spans(scene: Scene, table: Table, nc: int) -> Index:
+    """Return the velocities that each row may touch: of contacts those of the trees that meet, of others all."""
+    parents, bodies, above = dof_parents(table), {body.name: body for body in scene.bodies}, dict[str, int]()
+    root = np.arange(scene.nv)
+    for i in range(scene.nv):
+        root[i] = root[parents[i]] if parents[i] >= 0 else i
+    for joint in scene.joints:
+        above[joint.body] = int(root[table.dofs[joint.name]])
+    spans, met = np.tile([0, scene.nv], (nc, 1)), contacts(scene)
+    rows = [len(one.normals) for one in met], [len(one.tangents) for one in met]
+    row = nc - sum(width for _, width in scene.dry) - sum(map(sum, rows))
+    for kind in rows:
+        for contact, count in zip(met, kind, strict=True):
+            trees = [_tree(bodies, above, shape.body) for shape in (contact.first, contact.second)]
+            moved = np.flatnonzero(np.isin(root, trees))
+            spans[row : row + count] = moved[0], moved[-1] + 1
+            row += count
+    return spans
+
+
+def _tree(bodies: Mapping[str, Body], above: Mapping[str, int], name: str) -> int:
+    """Return the first velocity of the tree that a body belongs to, -1 of the world's."""
+    while name and name not in above:
+        name = bodies[name].parent
+    return above[name] if name else -1
 
 
 def system(
@@ -85,7 +113,7 @@ def system(
     parameters = table.p[: table.constants].copy()
     parameters[layout.TRACED] = code
     fields: dict[str, Any] = dict(
-        n=scene.nv, nq=scene.nq, above=dof_parents(table),
+        n=scene.nv, nq=scene.nq, above=dof_parents(table), span=_spans(scene, table, len(law.a0)),
         parameters=parameters, **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, b0=law.b0, b1=law.b1, unilateral=law.unilateral,
         **_friction(scene, len(law.a0)),

@@ -69,13 +69,18 @@ def test_a_box_that_falls_on_its_edge_comes_to_rest(slope: cases.Case, rtol: flo
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_box_that_nearly_falls_on_its_edge_goes_on(slope: cases.Case, seed: int) -> None:
-    """Three corners would jam together; without one of them the others go on, and no law says which."""
+    """Three corners would jam together; without one of them the others go on, and no law says which.
+
+    Of all that start as near two in thirty come to a jam by another way: behind an instant at which several sets hold
+    rounding chooses one, which is told.
+    """
     made, q0 = system(slope.scene, slope.law), slope.q0.copy()
     q0[:7] += 1e-6 * np.random.default_rng(seed).normal(size=7)
     q0[3:7] /= np.linalg.norm(q0[3:7])
     found = simulate(made, q0, slope.v0, 0.6, rtol=1e-9, ledger=True, max_steps=MOST_STEPS)
-    assert found.outcome is Outcome.FINISHED, found.message
-    assert found.determined_until < 0.6
+    assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
+    assert max(found.unique_until, found.determined_until) < found.t[-1]
+    assert found.outcome is Outcome.FINISHED or not goes_on(slope.scene, found)
 
 
 def dropped(seed: int) -> tuple[Any, np.ndarray, float]:

@@ -77,8 +77,19 @@ def test_belt_and_spring_forget_their_start_in_sticking():
 def test_a_sine_that_grazes_the_belt_has_no_derivative():
     found = sensitivity(belt(), [0, 0], [0, 0], 1.2)
     assert found.outcome is Outcome.ILL_POSED
-    assert "grazed at t = 0.939" in found.message
+    assert "row 0, which has friction, is grazed at t = 0.939" in found.message
     assert np.isnan(found.by_start).all()
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize("off", [0.0, 1e-12, -1e-12])
+def test_a_start_at_the_limit_of_sticking_has_no_derivative(off: float, space: bool) -> None:
+    """On one side of it the block stays, on the other it slides."""
+    rest = np.zeros(3 if space else 2)
+    found = sensitivity(point(0.4 * (1.0 + off), ALPHA, space=space), rest, rest, 1.0, parameters=["mu[0]"])
+    assert found.outcome is Outcome.ILL_POSED
+    assert "Row 0, which has friction, is at its bound at the start, t = 0 s" in found.message
+    assert np.isnan(np.hstack([found.by_start, found.by_parameters])).all()
 
 
 @kernels.dynamics
