@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import LAW, box_body, drawn, pair
+from friction_scenes import drawn, standing
 
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Joint, Scene, Shape
 from crossbody.reference import Options, prepare
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import OWN, accelerate, activate
@@ -68,22 +67,6 @@ def test_islands_move_as_all_rows_together(seed: int) -> None:
         if run.slice(5) < 1:
             break
         agree(run)
-
-
-def standing(bodies: int, feet: int, mu: float = 0.5) -> Scene:
-    """Return bodies that stand apart from each other, each on so many round feet."""
-    shapes, pairs = [Shape(name="floor", type="plane")], []
-    for b in range(bodies):
-        for f in range(feet):
-            at = 2.0 * np.pi * f / feet
-            place = (0.2 * np.cos(at), 0.2 * np.sin(at), -0.1)
-            shapes.append(Shape(name=f"s{b}.{f}", body=f"b{b}", type="sphere", size=(0.05, 0, 0), position=place))
-            pairs.append(pair("floor", f"s{b}.{f}", mu, LAW))
-    return Scene(
-        bodies=tuple(box_body(f"b{b}", (0.2, 0.15, 0.1)) for b in range(bodies)),
-        joints=tuple(Joint(name=f"j{b}", body=f"b{b}", type="free") for b in range(bodies)),
-        shapes=tuple(shapes), pairs=tuple(pairs),
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(("bodies", "feet"), [(4, 1), (3, 2), (3, 3), (4, 4), (1, 7)])

@@ -86,6 +86,22 @@ def stack(mu1: float, mu2: float, m1: float = 2.0, m2: float = 1.0) -> Scene:
     )  # fmt: skip
 
 
+def standing(bodies: int, feet: int, mu: float = 0.5) -> Scene:
+    """Return bodies that stand apart from each other, each on so many round feet."""
+    shapes, pairs = [Shape(name="floor", type="plane")], []
+    for b in range(bodies):
+        for f in range(feet):
+            at = 2.0 * np.pi * f / feet
+            place = (0.2 * np.cos(at), 0.2 * np.sin(at), -0.1)
+            shapes.append(Shape(name=f"s{b}.{f}", body=f"b{b}", type="sphere", size=(0.05, 0, 0), position=place))
+            pairs.append(pair("floor", f"s{b}.{f}", mu, LAW))
+    return Scene(
+        bodies=tuple(box_body(f"b{b}", (0.2, 0.15, 0.1)) for b in range(bodies)),
+        joints=tuple(Joint(name=f"j{b}", body=f"b{b}", type="free") for b in range(bodies)),
+        shapes=tuple(shapes), pairs=tuple(pairs),
+    )  # fmt: skip
+
+
 def rubbed() -> Iterator[tuple[str, Case]]:
     """Yield a ball on solids, capsules across each other, and a wheel: name and case."""
     turn, aside = Rotation.from_euler("xyz", [0.3, -0.4, 0.2]), (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
