@@ -134,7 +134,7 @@ def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
 def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
     """Return the instants (n,) at which a truth tells what jumps: its own event where the run tells both sides of it.
 
-    That is one of the same row and mode, or variable and value, which is as near as instants are judged to, with no
+    That is one of the same row and mode which is as near as instants are judged to, with no
     other sample between: between the two events one side alone would be beside both samples of the run, which counts
     for half a step of it.
     """
@@ -159,9 +159,8 @@ def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
 
 
 def _jumps(run: Trajectory) -> Iterator[tuple[float, tuple[str, int, int]]]:
-    """Yield where lam may jump: instant, and of what kind, row or variable, and its mode or value behind."""
+    """Yield where lam may jump: instant, and of what kind, row, and its mode behind."""
     yield from ((event.t, ("row", event.contact, event.after)) for event in run.events)
-    yield from ((switch.t, ("variable", switch.variable, switch.after)) for switch in run.switches)
 
 
 def _crosses(t: Floats, one: slice) -> bool:
