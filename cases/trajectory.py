@@ -65,7 +65,7 @@ class Switch:
         t: instant, s.
         variable: index in `Case.discrete`.
         before, after: its values.
-        smooth: nothing jumps there, but the derivative of a force.
+        smooth: the motion has no jump there; a force may, as the curvature of a gap beside an edge.
     """
 
     t: float

@@ -329,10 +329,11 @@ def _laws(plain: Plain, least: float) -> Iterator[Control]:
     if not _acts(plain.case, few, int(at[0]), int(at[1])):
         return
     # Friction of what slides is the run's own: changed, it asks for other normal forces, near a jam for far larger
-    # ones. And of rows that depend on others a part counts.
+    # ones, beside which a doubled one is small. And of rows that depend on others a part counts.
+    changes = ~_dragged(plain.case, few)
     twice = LARGE if plain.case.rubs else roughly(1.0) if plain.case.general else exactly(1.0)
     for sign, (times, said) in zip((1.0, -1.0), FORCED.items(), strict=True):
-        other = replace(few, lam=times * few.lam)
+        other = replace(few, lam=np.where(changes, times, 1.0) * few.lam)
         yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": twice}, plain=few)
         one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + sign * MUCH) * few.lam[at])
         seen = (TENTH * MUCH, ROUGH * MUCH)
@@ -340,6 +341,16 @@ def _laws(plain: Plain, least: float) -> Iterator[Control]:
             fault=f"the largest multiplier {sign * MUCH:g} off at one sample", run=one, sees={"law_residual": seen},
             plain=few,
         )  # fmt: skip
+
+
+def _dragged(case: Case, run: Trajectory) -> NDArray[np.bool_]:
+    """Return which multipliers (n, nc) are friction of what slides; none where it is dry and carries the most."""
+    if (system := equations(case)) is None:
+        return np.zeros(run.lam.shape, dtype=bool)
+    slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
+    dry, others = (np.max(np.abs(np.where(some, run.lam, 0.0))) for some in (slides & system.dry, ~slides))
+    dragged: NDArray[np.bool_] = slides & bool(dry <= others)
+    return dragged
 
 
 def _acts(case: Case, run: Trajectory, i: int, row: int) -> bool:

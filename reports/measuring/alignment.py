@@ -74,19 +74,25 @@ def turns(run: Trajectory) -> list[tuple[float, int, Mode]]:
     return sorted((e.t, e.contact, e.after) for e in run.events if {e.before, e.after} <= between)
 
 
+def kinks(run: Trajectory) -> list[tuple[float, int, int]]:
+    """When a gap is that of another face, edge or corner, whose curvature lam follows: instant, variable, its value."""
+    return sorted((s.t, s.variable, s.after) for s in run.switches if s.smooth)
+
+
 def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
     """The truth's time of every sample of the run (n,), s.
 
-    Where lam jumps besides, at `releases` and between stick and slip, is laid on the truth's too
+    Where lam jumps besides, at `releases`, between stick and slip and at `kinks`, is laid on the truth's too
     if it is asked for.
     """
     start, pairs = float(truth.trajectory.t[0]), matched(truth, run)
     knots = [(b.touch, a.touch) for a, b in pairs]
     if releases:
         knots += [(b.release, a.release) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
-        mine, theirs = turns(run), turns(truth.trajectory)
-        if [one[1:] for one in mine] == [one[1:] for one in theirs]:
-            knots += [(b[0], a[0]) for a, b in zip(theirs, mine, strict=True)]
+        for told in (turns, kinks):
+            mine, theirs = told(run), told(truth.trajectory)
+            if [one[1:] for one in mine] == [one[1:] for one in theirs]:
+                knots += [(b[0], a[0]) for a, b in zip(theirs, mine, strict=True)]
     here, there = _rising(start, knots)
     late = np.maximum(run.t - here[-1], 0.0)
     mapped: Floats = np.interp(run.t, here, there) + late
@@ -128,18 +134,19 @@ def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
 def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
     """Return the instants (n,) at which a truth tells what jumps: its own event where the run tells both sides of it.
 
-    That is one of the same row and mode which is as near as instants are judged to, with no other sample between:
-    between the two events one side alone would be beside both samples of the run, which counts for half a step of it.
+    That is one of the same row and mode which is as near as instants are judged to, with no
+    other sample between: between the two events one side alone would be beside both samples of the run, which counts
+    for half a step of it.
     """
-    theirs: dict[tuple[int, Mode], list[float]] = {}
-    for event in truth.trajectory.events:
-        theirs.setdefault((event.contact, event.after), []).append(event.t)
-    known, sides, moved = {event.t for event in truth.trajectory.events}, np.array(t), list[slice]()
-    for event in run.events:
-        first, last = (int(np.searchsorted(run.t[: len(t)], event.t, side=side)) for side in ("left", "right"))
+    theirs: dict[tuple[str, int, int], list[float]] = {}
+    for instant, what in _jumps(truth.trajectory):
+        theirs.setdefault(what, []).append(instant)
+    known, sides, moved = {instant for all_ in theirs.values() for instant in all_}, np.array(t), list[slice]()
+    for instant, what in _jumps(run):
+        first, last = (int(np.searchsorted(run.t[: len(t)], instant, side=side)) for side in ("left", "right"))
         if last - first < 2 or (here := float(t[first])) in known:
             continue
-        times = np.array(theirs.get((event.contact, event.after), [np.inf]))
+        times = np.array(theirs.get(what, [np.inf]))
         near = float(times[np.argmin(np.abs(times - here))])
         if abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
             sides[first:last] = near
@@ -149,6 +156,11 @@ def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
             sides[one] = t[one]
             moved.remove(one)
     return sides
+
+
+def _jumps(run: Trajectory) -> Iterator[tuple[float, tuple[str, int, int]]]:
+    """Yield where lam may jump: instant, and of what kind, row, and its mode behind."""
+    yield from ((event.t, ("row", event.contact, event.after)) for event in run.events)
 
 
 def _crosses(t: Floats, one: slice) -> bool:

@@ -48,7 +48,7 @@ FOUR_BAR = """
 """
 
 
-def robot(folder: Path, text: str, **given: float) -> Case:
+def robot(folder: Path, text: str, **given: Any) -> Case:
     """A robot's file as a case."""
     path = folder / "robot.xml"
     path.write_text(text, encoding="utf-8")
@@ -115,6 +115,34 @@ BALLS = """
 <keyframe><key name="go" qpos="-.5 0 .0451 1 0 0 0 0 0 0 1 0 0 0" qvel="2.677 0 0 0 0 0 0 0 0 0 0 0"/></keyframe>
 </mujoco>
 """
+
+
+ROLLS_OFF = """
+<mujoco><worldbody><geom type="box" size=".2 .2 .1" pos="0 0 -.1" friction=".5 0 0" condim="3"/>
+<body pos=".17 0 .05"><freejoint/><geom type="sphere" size=".05" mass=".5" friction=".5 0 0" condim="3"/></body>
+</worldbody><keyframe><key name="k" qpos=".17 0 .05 1 0 0 0" qvel=".3 .1 0 0 0 0"/></keyframe></mujoco>
+"""
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.3, 0.5])
+def test_a_ball_that_rolls_over_the_edge_of_a_table(tmp_path: Path, speed: float) -> None:
+    """Where its gap is that of the edge, no longer of the face, the curvature jumps, and the force with it."""
+    case = robot(tmp_path, ROLLS_OFF.replace(".3 .1", f"{speed} .1"), key="k", t_end=0.25)
+    assert wrong(case) == []
+
+
+TUMBLES = """
+<mujoco><worldbody><geom type="plane" size="2 2 .1" condim="3" friction="1 .005 .0001"/>
+<body pos="0 0 .25" euler="35 20 10"><freejoint/><geom type="box" size=".05 .05 .05" mass="1" condim="3"
+friction="1 .005 .0001"/></body></worldbody><keyframe><key name="k" qpos="0 0 .2 .00125712137695683 .3052947823033319
+-.2801476385953972 -.9101158256692538" qvel="-.1364012355515168 -.2974939664989387 0 4.0206457366636 -1.476619555653989
+-1.8614246994598211"/></keyframe></mujoco>
+"""
+
+
+def test_a_box_that_slides_on_a_corner_near_a_jam(tmp_path: Path) -> None:
+    """Doubled, its friction asks for a normal force far larger than the doubled one is off by."""
+    assert wrong(robot(tmp_path, TUMBLES, key="k", t_end=0.2)) == []
 
 
 def test_a_slide_so_short_that_a_fault_of_it_is_no_larger_than_errors_grow(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from crossbody import cases
-from crossbody.cases import Event, Mode, Tier, Trajectory
+from crossbody.cases import Event, Mode, Switch, Tier, Trajectory
 from crossbody.cases.defaults import shortest
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import aligned, instants
@@ -102,3 +102,22 @@ def test_jumps_of_several_rows_that_are_nearer_to_each_other_than_a_run_is_to_it
     truth = from_run(pushed(at, np.sort(np.append(t, 0.9))), Tier.A, "made up")
     run = pushed(at + late, np.sort(t))
     np.testing.assert_array_equal(aligned(truth, run)[1].lam, run.lam)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_gap_that_is_of_another_edge_is_beside_a_run_on_both_sides(seed: int) -> None:
+    """Its curvature jumps, and the force with it: a run tells both sides, an instant beside the truth's."""
+    draw = np.random.default_rng(seed)
+    off = draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, np.log10(shortest(CASE.t_end)))
+
+    def switched(run: Trajectory, at: float) -> Trajectory:
+        kink = Switch(t=at, variable=0, before=0, after=1, smooth=True)
+        return replace(run, events=EVENTS[:-1], switches=(kink,))
+
+    truth = replace(TRUTH, trajectory=switched(TRUTH.trajectory, TURN))
+    apart = draw.uniform(0.0, CASE.t_end, 20)
+    times = np.concatenate([[0.0, CASE.t_end], apart[np.abs(apart - TURN) > 1e-5]])
+    run = switched(turned(off, times), TURN + off)
+    inside, exact = aligned(truth, run, releases=True)
+    np.testing.assert_allclose(exact.lam, run.lam[inside], rtol=1e-9, atol=1e-9)
+    assert metrics.load("lam_impulse_path").measure(truth, run, CASE) < 1e-9 + 10.0 * abs(off) / CASE.t_end
