@@ -16,7 +16,7 @@ from crossbody.reports.measuring.truth import from_run
 
 TOUCH, END = 0.2, 1.0
 LATE, HAIR, COARSE, FINE = 1e-3, 1e-13, 0.05, 1e-3
-"""By how much a release comes late, and a turn is off, s, and steps of a run and of its truth."""
+"""By how much a release comes late, and a hand-over is off, s, and steps of a run and of its truth."""
 LEFT, DEEP, SAME = 0.3, 0.4, 1e-6
 """Force that a row lets go of, of 1 N, its gap there, of ways of 1 m, and part by which an answer may differ."""
 Found = tuple[str, float, Range, str]
@@ -27,7 +27,7 @@ def wrong() -> tuple[Found, ...]:
     """Return metric, number, least and most, and motion, of what is another number than it must be."""
     return tuple(
         (name, found, (wanted, wanted), said)
-        for name, found, wanted, said in (*_sides(), *_impulses(), *_turns())
+        for name, found, wanted, said in (*_sides(), *_impulses(), *_hand_overs())
         if not abs(found - wanted) <= SAME * max(wanted, SAME)
     )  # fmt: skip
 
@@ -91,24 +91,25 @@ def _impulses() -> Iterator[tuple[str, float, float, str]]:
         yield "lam_impulse_path", found, LATE / (release - TOUCH), "a force that ends late"
 
 
-def turned(at: float, step: float) -> Trajectory:
-    """Return a row that friction holds back with 1 N, s, and from an instant on with as much the other way."""
+def handed(at: float, step: float) -> Trajectory:
+    """Return a row that bears 2 N in a collision and, from an instant, s, on 1 N in the contact that follows."""
     t = sampled(step, at)
     column, before = np.linspace(0.0, 1.0, len(t))[:, None], np.arange(len(t)) <= np.searchsorted(t, at, side="left")
-    modes = ((0.0, Mode.FREE), (at, Mode.SLIP))
+    ways = ((0.0, Mode.FREE, Mode.COLLISION), (at, Mode.COLLISION, Mode.CONTACT))
     return Trajectory(
-        t=t, q=column, v=column, gap=0.0 * column, lam=np.where(before, 1.0, -1.0)[:, None],
-        energy=np.hstack([column, column]), mode=np.full((len(t), 1), Mode.SLIP, dtype=np.int8),
-        events=tuple(Event(t=t, contact=0, before=mode, after=Mode.SLIP) for t, mode in modes),
+        t=t, q=column, v=column, gap=0.0 * column, lam=np.where(before, 2.0, 1.0)[:, None],
+        energy=np.hstack([column, column]),
+        mode=np.where(before, Mode.COLLISION, Mode.CONTACT)[:, None].astype(np.int8),
+        events=tuple(Event(t=t, contact=0, before=mode, after=behind) for t, mode, behind in ways),
     )  # fmt: skip
 
 
-def _turns() -> Iterator[tuple[str, float, float, str]]:
-    """Ask for the impulse of a force that turns round a hair beside where it does so in the truth: nothing is off."""
-    case, at = case_of(("m",), (), 1, rubs=1), 0.6
+def _hand_overs() -> Iterator[tuple[str, float, float, str]]:
+    """Ask for the impulse of a force that jumps a hair beside where it does so in the truth: nothing is off."""
+    case, at = case_of(("m",), (True,), 1), 0.6
     for off in (-HAIR, HAIR):
-        found = _measured("lam_impulse", turned(at, FINE), turned(at + off, COARSE), case)
-        yield "lam_impulse", found, 0.0, "a force that turns round"
+        found = _measured("lam_impulse", handed(at, FINE), handed(at + off, COARSE), case)
+        yield "lam_impulse", found, 0.0, "a force that jumps"
 
 
 def _measured(name: str, exact: Trajectory, run: Trajectory, case: object) -> float:
