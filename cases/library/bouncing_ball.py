@@ -128,7 +128,8 @@ def _all(wanted: dict[str, tuple[float, str]], bilateral: bool, p: Mapping[str, 
             yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=_FIXED)
     else:
         located = [m for m in wanted if (ERRORS | CLAIMS)[m][0] == _THOUSANDFOLD and m not in _EXACT_THERE]
-        for metric in (*located, "velocity", "gap_error", "mode_times", "lam_impulse_path", *STEP_PARTS):
+        others = ("velocity", "gap_error", "mode_times", "lam_impulse_path", "restitution_error")
+        for metric in (*located, *others, *STEP_PARTS):
             value = _located(metric, p)
             yield Limit(metric=metric, value=value, engine="mujoco", profile="matched", why=_LOCATED)
     for engine, profile, *sizes, why in _STEP if bilateral else _STEP[1:]:
