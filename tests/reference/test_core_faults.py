@@ -200,13 +200,14 @@ def test_a_run_that_is_lost_at_its_start_still_shows_the_start():
     assert run.q.tolist() == [[0.3]]
 
 
-@pytest.mark.parametrize("call", [5, 10])
+@pytest.mark.parametrize("call", [1, 5])
 def test_interrupt_that_meets_a_library_at_its_work_is_answered(call, monkeypatch):
     """The library enters compiled code by Python of its own, and may swallow what is raised there."""
     given, calls = CompiledRun.slice, count(1)
 
     def interrupted(run, budget):
-        if next(calls) == call:  # not in the first slice: a run as short as that is not worth the handler
+        held = signal.getsignal(signal.SIGINT) is not signal.default_int_handler  # not in runs as short as first slices
+        if held and next(calls) == call:
             try:
                 os.kill(os.getpid(), signal.SIGINT)
                 time.sleep(0.0)
