@@ -18,6 +18,7 @@ from crossbody.cases import Case, CaseUnsupported, EngineUnavailable, Trajectory
 from crossbody.reports.bench import measure
 from crossbody.reports.bench.ladder import Effort
 from crossbody.reports.cli import main
+from crossbody.reports.judging import known
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.runs import jobs, watch
 
@@ -60,6 +61,7 @@ def _fake(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
             raise EngineUnavailable("Engine 'absent' needs the package 'absent', which is not installed.")
         raise UnknownName("engine", name, ("fake", "absent"))
 
+    list(known.wrong())  # asked of the engines as they are, once in a process
     monkeypatch.setattr(engines, "names", lambda: ("absent", "fake"))
     monkeypatch.setattr(engines, "load", load)
     monkeypatch.chdir(tmp_path)
