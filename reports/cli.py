@@ -287,12 +287,10 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float | No
 
     FILE.svg or FILE.png shows one instant, FILE.gif the whole motion.
     """
-    from crossbody.reports.judging import known
+    from crossbody.reports.commands.shared import check_answers
     from crossbody.reports.pages import picture as drawing
-    from crossbody.reports.runs import watch
 
-    known.once = watch.alone()
-    known.check("picture")
+    check_answers("picture")
     from crossbody.reports.pages.results import motion
 
     trace = motion(folder, case, engine)

@@ -29,6 +29,7 @@ from crossbody.reports.analysis import bode, numbers
 from crossbody.reports.analysis.counterparts import compared
 from crossbody.reports.analysis.loci import limits, root_locus
 from crossbody.reports.analysis.places import Place, places
+from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.verdict import Word
 
@@ -44,17 +45,16 @@ Asked = tuple[str, str, float, float]
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    found: list[Found] = []
-    for kind in (_weight, _responses, _ranks, _poles, _loci, _curves, _engines):
-        try:
-            asked = list(kind())
-        except Exception as error:  # what ends so says no number
-            asked = [("analysis", f"a model that ends in {type(error).__name__}: {error}", math.nan, 0.0)]
-        found += [
-            (name, value, (wanted, wanted), what)
-            for name, what, value, wanted in asked if not abs(value - wanted) <= SOLVED * max(abs(wanted), 1e-3)
-        ]  # fmt: skip
-    return tuple(found)
+    return tuple(
+        (name, value, (wanted, wanted), what)
+        for kind in (_weight, _responses, _ranks, _poles, _loci, _curves, _engines)
+        for name, what, value, wanted in rows_of(kind, _failed)
+        if not abs(value - wanted) <= SOLVED * max(abs(wanted), 1e-3)
+    )
+
+
+def _failed(why: str) -> Asked:
+    return "analysis", f"a model that ends in {why}", math.nan, 0.0
 
 
 def _rows(table: pd.DataFrame) -> list[dict[Any, Any]]:

@@ -19,6 +19,7 @@ from crossbody.reports.bench.headline import headline
 from crossbody.reports.bench.measure import COLUMNS, Rung, row_of
 from crossbody.reports.bench.order import orders
 from crossbody.reports.bench.skip import ratio
+from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.known_answers import UNLIKE, answers
 from crossbody.reports.judging.made_up import MadeUp, case_of
 from crossbody.reports.judging.planted import Range
@@ -35,17 +36,16 @@ Asked = tuple[str, str, float, float]
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    found: list[Found] = []
-    for kind in (_orders, _ratios, _medians, _errors, _cubics, _lost, _held):
-        try:
-            asked = list(kind())
-        except Exception as error:  # a table that cannot be made has no number
-            asked = [("benchmark", f"tables that end in {type(error).__name__}: {error}", math.nan, 0.0)]
-        found += [
-            (name, value, (wanted, wanted), what)
-            for name, what, value, wanted in asked if not abs(value - wanted) <= EXACT * max(abs(wanted), 1e-300)
-        ]  # fmt: skip
-    return tuple(found)
+    return tuple(
+        (name, value, (wanted, wanted), what)
+        for kind in (_orders, _ratios, _medians, _errors, _cubics, _lost, _held)
+        for name, what, value, wanted in rows_of(kind, _failed)
+        if not abs(value - wanted) <= EXACT * max(abs(wanted), 1e-300)
+    )
+
+
+def _failed(why: str) -> Asked:
+    return "benchmark", f"tables that end in {why}", math.nan, 0.0
 
 
 def _timed(engine: str, settings: Any, off: Any, ms: Any, **more: Any) -> pd.DataFrame:

@@ -18,10 +18,9 @@ from crossbody.reports.analysis import numbers as work
 from crossbody.reports.analysis.counterparts import counterparts
 from crossbody.reports.analysis.loci import Family, limits, root_locus
 from crossbody.reports.analysis.places import places
-from crossbody.reports.commands.shared import print_rows, publish, where
-from crossbody.reports.judging import known
+from crossbody.reports.commands.shared import check_answers, print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
-from crossbody.reports.runs import choice, output, watch
+from crossbody.reports.runs import choice, output
 from crossbody.reports.runs.provenance import provenance
 
 OMEGA = np.geomspace(1e-2, 1e4, 301)
@@ -70,8 +69,7 @@ def analyse(
     Pairs K=V are parameters to change, or where to look; locus is PARAM=a..b; without a folder
     nothing is written.
     """
-    known.once = watch.alone()
-    known.check("analyse")
+    check_answers("analyse")
     overrides, place = choice.parse_settings(pairs), parse_place(at)
     case = cases.load(name, variant, **overrides)
     case = rubbing(case) or case  # an equilibrium may rest on contacts that slide
@@ -111,8 +109,7 @@ def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
     if "kstar" in parameters:
         raise InvalidValue(f"kstar is what the curves differ in: {', '.join(f'{k:g}' for k in curves.GAINS)}.")
     output.check(out, "bode")
-    known.once = watch.alone()
-    known.check("analyse")
+    check_answers("analyse")
     found = [curves.soft_contact(k, mode, **parameters) for mode in curves.MODES for k in curves.GAINS]
     held = [curve for curve in found if curve.mode == "grasp"]
     tables = {"bode": curves.table(held, curves.FREQUENCIES), "poles": curves.poles(found)}

@@ -15,9 +15,8 @@ from crossbody.reports import layout, voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
 from crossbody.reports.bench.headline import headline
-from crossbody.reports.commands.shared import identity, key, print_rows, publish, where
-from crossbody.reports.judging import known
-from crossbody.reports.runs import choice, files, output, watch
+from crossbody.reports.commands.shared import check_answers, identity, key, print_rows, publish, where
+from crossbody.reports.runs import choice, files, output
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -47,8 +46,7 @@ def run(
     each = math.inf if minutes is None else 60.0 * minutes / max(1, len(cases) * len(picks))
     effort = scenes.effort(full, every_rung=bool(names or variant or pairs), repeats=repeats, each=each)
     output.check(out, "bench")
-    known.once = watch.alone()
-    known.check("bench")
+    check_answers("bench")
     with Parts(out, command, identity("bench", cases, names, picks=picks, effort=effort)) as parts:
         with progress(len(cases) * len(picks)) as tell:
             for i, case in enumerate(cases):
@@ -123,8 +121,7 @@ def alone(what: str, repeats: int | None, out: Path, command: str, limit: float 
     if any(asked.values()):
         raise InvalidValue(f"--{what} has its own scenes; only --out and --repeats can be combined with it.")
     output.check(out, what)
-    known.once = watch.alone()
-    known.check("bench")
+    check_answers("bench")
     rows = (skip if what == "skip" else throughput).measure(repeats or 5)
     beyond = rows[~rows["held"].astype(bool)]
     return table(what, rows, out, command, [str(text) for text in beyond["what"]])

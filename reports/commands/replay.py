@@ -16,9 +16,8 @@ from crossbody.cases import CaseUnsupported
 from crossbody.cases.errors import several
 from crossbody.hw import Comparison, Fit, Log
 from crossbody.reports import layout, voice
-from crossbody.reports.commands.shared import identity, print_rows, where
+from crossbody.reports.commands.shared import check_answers, identity, print_rows, where
 from crossbody.reports.figures.section import records
-from crossbody.reports.judging import known
 from crossbody.reports.judging.verdict import Word, exit_code
 from crossbody.reports.layout import unit_text
 from crossbody.reports.pages import site as page
@@ -89,8 +88,7 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
     """Replay a log, "forward" or "closed_loop", on engines or all usual ones, and write the report."""
     hw.models.load(ask.model)
     output.check(out, "replay")
-    known.once = watch.alone()
-    known.check("replay")
+    check_answers("replay")
     given = comparison.parse(ask.limits)
     engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
     if not engines:
@@ -140,8 +138,7 @@ def run_identify(
     """
     model = hw.models.load(ask.model)
     output.check(out, "identify")
-    known.once = watch.alone()
-    known.check("replay")
+    check_answers("replay")
     asked = comparison.parse(ask.limits)
     log, given = ask.log(), choice.parse_settings(ask.pairs)
     label = f"{ask.model} identified from {ask.path}"

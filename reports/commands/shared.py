@@ -12,7 +12,8 @@ import click
 from crossbody.cases import Case, installed
 from crossbody.cases.loading import OF_USERS, parted
 from crossbody.reports import layout, voice
-from crossbody.reports.runs import output, study
+from crossbody.reports.judging import known
+from crossbody.reports.runs import output, study, watch
 from crossbody.reports.runs.manifest import PAGE
 from crossbody.reports.sources import code
 
@@ -32,6 +33,12 @@ def _acting(cases: Sequence[Case]) -> list[str]:
     """Files that say what acts on the cases: tables of controls, controllers."""
     told = [(str(case.parameters.get("ctrl", "")), str(case.parameters.get("control", ""))) for case in cases]
     return sorted({name for table, control in told for name in (table, control.rpartition(":")[0]) if name})
+
+
+def check_answers(command: str) -> None:
+    """Ask for the known answers of a command before it says a number; see `known.check`."""
+    known.once = watch.alone()
+    known.check(command)
 
 
 def key(number: int, case: Case) -> str:

@@ -32,9 +32,7 @@ class Answers:
         """Return the motion at instants: what answers that are kept know of it, the latest first, else integrated."""
         if not len(times):
             return self._integrate(times)
-        known, found = list(self._kept), _Found(times)
-        for number in reversed(range(len(known))):
-            found.look(number, known[number].t)
+        known, found = list(self._kept), self._looked_for(times)
         if (missing := found.missing()).any():
             if not self._fits(int(missing.sum()), beside=sum(run.lam.nbytes for run in known)):
                 missing[:] = True  # what is known would be lost, and be missing next time
@@ -49,7 +47,7 @@ class Answers:
         Args:
             asked: instants of several questions (n,), each nondecreasing.
         """
-        new = [times[missing] for times in asked if (missing := self._missing(times)).any()]
+        new = [times[missing] for times in asked if (missing := self._looked_for(times).missing()).any()]
         if len(new) < 2:
             return
         once = distinct(*new)
@@ -63,11 +61,12 @@ class Answers:
         rows = self._kept[-1].lam.shape[1] if self._kept else 1
         return 8 * rows * count + beside <= ROOM
 
-    def _missing(self, times: Floats) -> NDArray[np.bool_]:
+    def _looked_for(self, times: Floats) -> _Found:
+        """Return where instants stand in the answers that are kept, the latest first."""
         found = _Found(times)
-        for number, known in enumerate(self._kept):
-            found.look(number, known.t)
-        return found.missing()
+        for number in reversed(range(len(self._kept))):
+            found.look(number, self._kept[number].t)
+        return found
 
     def _keep(self, answer: Trajectory) -> Trajectory:
         while self._kept and sum(run.lam.nbytes for run in (*self._kept, answer)) > ROOM:

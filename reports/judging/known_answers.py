@@ -13,11 +13,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from crossbody.cases import Event, Mode, Trajectory
+from crossbody.cases import Case, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.made_up import MadeUp, case_of
 from crossbody.reports.judging.planted import Range
+from crossbody.reports.measuring.truth import Truth
 
 EXACT = 1e-9
 """Part of an answer by which sums in another order differ, and what a run is allowed at its surface."""
@@ -47,17 +48,17 @@ def wrong() -> tuple[tuple[str, float, Range, str], ...]:
 
 def _wrong(made: MadeUp, wanted: Answers) -> Iterator[tuple[str, float, Range, str]]:
     for name, value in wanted.items():
-        found = _found(made, name)
+        found = measured(name, made.truth, made.run, made.case)
         if value is None and found is not None:
             yield name, found, (np.nan, np.nan), "a number of a motion that has none"
         elif value is not None and not (found is not None and abs(found - value) <= EXACT * abs(value)):
             yield name, np.nan if found is None else found, (value, value), "a made-up motion"
 
 
-def _found(made: MadeUp, name: str) -> float | None:
+def measured(name: str, truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Return what a metric says; NaN where it throws."""
     try:
-        return metrics.load(name).measure(made.truth, made.run, made.case)
+        return metrics.load(name).measure(truth, run, case)
     except Exception:
         return np.nan
 

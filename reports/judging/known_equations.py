@@ -22,7 +22,7 @@ from crossbody.cases import Case, Event, Ledger, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
-from crossbody.reports import metrics
+from crossbody.reports.judging.known_answers import measured
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.measuring.truth import Truth
 
@@ -53,10 +53,7 @@ def _said(names: dict[str, float], what: str, runs: tuple[Trajectory, Trajectory
         touches=case.law.touches,
     )  # fmt: skip
     for name, wanted in names.items():
-        try:
-            found = metrics.load(name).measure(truth, runs[1], case)
-        except Exception:
-            found = None
+        found = measured(name, truth, runs[1], case)
         yield name, what, np.nan if found is None else found, wanted
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from crossbody import cases
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
+from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.planted import Range
 
 EXACT = 1e-9
@@ -58,16 +59,12 @@ Asked = tuple[str, Any, Any]
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what was read, as it is, least and most, and of which file; nothing where no compiler is installed."""
-    found: list[Found] = []
-    for kind in (_mjcf, _urdf) if find_spec("mujoco") else ():
-        name = kind.__name__.strip("_")
-        try:
-            asked = list(kind())
-        except Exception as error:  # what cannot be read has no numbers
-            found.append((f"reader of {name}", np.nan, (np.nan, np.nan), f"{type(error).__name__}: {error}"))
-            continue
-        found += [(f"reader of {name}", *one, what) for what, mine, right in asked if (one := _off(mine, right))]
-    return tuple(found)
+    return tuple(
+        (f"reader of {kind.__name__.strip('_')}", *one, what)
+        for kind in ((_mjcf, _urdf) if find_spec("mujoco") else ())
+        for what, mine, right in rows_of(kind, lambda why: (why, np.nan, ""))  # what cannot be read has no numbers
+        if (one := _off(mine, right))
+    )
 
 
 def _off(mine: Any, right: Any) -> tuple[float, Range] | None:

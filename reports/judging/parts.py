@@ -237,6 +237,17 @@ def _most(error: Floats) -> float:
     return float(np.max(np.abs(error), initial=0.0))
 
 
+def _around(t: Floats, instants: Floats) -> NDArray[np.intp]:
+    """Return the samples at t (n,) before and behind instants (m,): (2, m)."""
+    behind = np.clip(np.searchsorted(t, instants), 0, len(t) - 1)
+    return np.stack([np.maximum(behind - 1, 0), behind])
+
+
+def _asked(t: Floats, samples: NDArray[np.intp], truth: Truth) -> Floats:
+    """Return when a truth is asked for at samples: it ends where it ends."""
+    return np.minimum(t[samples], float(truth.trajectory.t[-1]))
+
+
 class Positions:
     """Errors of positions of the runs of one engine, at the same samples.
 
@@ -283,16 +294,7 @@ class Positions:
         """Have the truth found at once for all runs that will be laid on it."""
         if self.whole.size:
             clocks = (clock(self.truth, run) for run in runs if len(run.t))
-            self.truth.expect(self._asked(t, distinct(self._around(t, self.t)), self.truth) for t in clocks)
-
-    def _around(self, t: Floats, instants: Floats) -> NDArray[np.intp]:
-        """Return the samples at t (n,) before and behind instants (m,): (2, m)."""
-        behind = np.clip(np.searchsorted(t, instants), 0, len(t) - 1)
-        return np.stack([np.maximum(behind - 1, 0), behind])
-
-    def _asked(self, t: Floats, samples: NDArray[np.intp], truth: Truth) -> Floats:
-        """Return when a truth is asked for at samples: it ends where it ends."""
-        return np.minimum(t[samples], float(truth.trajectory.t[-1]))
+            self.truth.expect(_asked(t, distinct(_around(t, self.t)), self.truth) for t in clocks)
 
     def _lay(self, run: Trajectory, truth: Truth, instants: Floats) -> Floats:
         """Return the error of a run at instants (m,) of the truth's clock.
@@ -303,9 +305,9 @@ class Positions:
         t = clock(truth, run)
         if not len(t) or t[-1] < instants.max() - REACHED * self.case.t_end:
             raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
-        before, behind = around = self._around(t, instants)
+        before, behind = around = _around(t, instants)
         needed = distinct(around)
-        exact = truth.at(self._asked(t, needed, truth))
+        exact = truth.at(_asked(t, needed, truth))
         error = self._error(run.q[needed], exact.q)
         a, b = (np.searchsorted(needed, side) for side in (before, behind))
         width = (t[behind] - t[before])[:, None]

@@ -134,19 +134,18 @@ def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
 def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
     """Return the instants (n,) at which a truth tells what jumps: its own event where the run tells both sides of it.
 
-    That is one of the same row and mode which is as near as instants are judged to, with no
-    other sample between: between the two events one side alone would be beside both samples of the run, which counts
-    for half a step of it.
+    That is one of the same row and mode which is as near as instants are judged to, with no other sample between:
+    between the two events one side alone would be beside both samples of the run, which counts for half a step of it.
     """
-    theirs: dict[tuple[str, int, int], list[float]] = {}
-    for instant, what in _jumps(truth.trajectory):
-        theirs.setdefault(what, []).append(instant)
-    known, sides, moved = {instant for all_ in theirs.values() for instant in all_}, np.array(t), list[slice]()
-    for instant, what in _jumps(run):
-        first, last = (int(np.searchsorted(run.t[: len(t)], instant, side=side)) for side in ("left", "right"))
+    theirs: dict[tuple[int, Mode], list[float]] = {}
+    for event in truth.trajectory.events:
+        theirs.setdefault((event.contact, event.after), []).append(event.t)
+    known, sides, moved = {event.t for event in truth.trajectory.events}, np.array(t), list[slice]()
+    for event in run.events:
+        first, last = (int(np.searchsorted(run.t[: len(t)], event.t, side=side)) for side in ("left", "right"))
         if last - first < 2 or (here := float(t[first])) in known:
             continue
-        times = np.array(theirs.get(what, [np.inf]))
+        times = np.array(theirs.get((event.contact, event.after), [np.inf]))
         near = float(times[np.argmin(np.abs(times - here))])
         if abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
             sides[first:last] = near
@@ -156,11 +155,6 @@ def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
             sides[one] = t[one]
             moved.remove(one)
     return sides
-
-
-def _jumps(run: Trajectory) -> Iterator[tuple[float, tuple[str, int, int]]]:
-    """Yield where lam may jump: instant, and of what kind, row, and its mode behind."""
-    yield from ((event.t, ("row", event.contact, event.after)) for event in run.events)
 
 
 def _crosses(t: Floats, one: slice) -> bool:

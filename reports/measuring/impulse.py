@@ -59,18 +59,19 @@ def true_impulse(run: Trajectory, exact: Trajectory, whole: Trajectory) -> Float
     return np.stack([np.interp(exact.t, whole.t, row) for row in own.T], axis=1)
 
 
-def before_stops(run: Trajectory) -> NDArray[np.intp]:
-    """Return the samples of a run that show a slip at the instant at which it stops or turns, in their order.
+def before_stops(run: Trajectory, exact: Trajectory) -> tuple[Trajectory, Trajectory]:
+    """Return a run and the truth beside it with the multipliers of the sample before where a slip stops or turns.
 
     A slip that dies out may turn within nanoseconds, and its friction with it: what it is at that instant tells nothing
     of the step before it, for half of which the sample would stand.
     """
     ends = [event for event in run.events if event.before == Mode.SLIP and event.after in (Mode.SLIP, Mode.STICK)]
     at = {i for e in ends for i in np.flatnonzero((run.t == e.t) & (run.mode[:, e.contact] == Mode.SLIP)).tolist()}
-    return np.array(sorted(at - {0}), dtype=np.intp)
+    samples = np.array(sorted(at - {0}), dtype=np.intp)
+    return _held(run, samples), _held(exact, samples)
 
 
-def held(run: Trajectory, samples: NDArray[np.intp]) -> Trajectory:
+def _held(run: Trajectory, samples: NDArray[np.intp]) -> Trajectory:
     """Return a motion with the multipliers of the sample before each of these (n,), which are in order."""
     lam = run.lam.copy()
     for i in samples[samples < len(lam)].tolist():

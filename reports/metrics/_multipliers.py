@@ -10,15 +10,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.impulse import (
-    away,
-    before_stops,
-    cumulative,
-    held,
-    told,
-    true_impulse,
-    with_collisions,
-)
+from crossbody.reports.measuring.impulse import away, before_stops, cumulative, told, true_impulse, with_collisions
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
 
@@ -83,8 +75,7 @@ def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     if np.isnan(run.lam).any():
         return math.nan
-    stops = before_stops(run)
-    run, exact = held(run, stops), held(exact, stops)
+    run, exact = before_stops(run, exact)
     mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
     scale = float(np.max(np.abs(theirs), initial=0.0))
     least = idle(truth.trajectory) * case.t_end
@@ -106,8 +97,7 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     if np.isnan(run.lam).any():
         return math.nan
-    stops = before_stops(run)
-    run, exact = held(run, stops), held(exact, stops)
+    run, exact = before_stops(run, exact)
     theirs = true_impulse(run, exact, truth.trajectory)
     scale = float(np.max(np.abs(theirs), initial=0.0))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)

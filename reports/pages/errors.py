@@ -77,15 +77,19 @@ def largest(trace: Trace) -> Iterator[dict[str, Any]]:
             }  # fmt: skip
 
 
+def _largest_of(traces: Sequence[Trace]) -> list[dict[str, Any]]:
+    return [row for trace in traces if trace.truth is not None for row in largest(trace)]
+
+
 def farthest_off(traces: Sequence[Trace]) -> list[Table]:
     """Return the table of the largest errors of all engines, one line a unit; none where nothing is compared."""
-    rows = [row for trace in traces if trace.truth is not None for row in largest(trace)]
+    rows = _largest_of(traces)
     return [Table(title="Largest errors of coordinates, by unit", columns=LARGEST, rows=rows)] if rows else []
 
 
 def told(traces: Sequence[Trace]) -> str:
     """Say which engine is farthest off, in each unit; nothing where nothing is compared."""
-    rows = [row for trace in traces if trace.truth is not None for row in largest(trace)]
+    rows = _largest_of(traces)
     worst = {unit: max((row for row in rows if row["unit"] == unit), key=lambda row: row["size"])
              for unit in dict.fromkeys(row["unit"] for row in rows)}  # fmt: skip
     texts = [

@@ -26,6 +26,7 @@ from crossbody.hw.reading.columns import parse_columns
 from crossbody.hw.reading.stream import Rows, join
 from crossbody.hw.replaying import measures
 from crossbody.hw.windows.whiteness import noise_level
+from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.planted import Range
 
 Found = tuple[str, float, Range, str]
@@ -93,17 +94,16 @@ WALL = 0.5
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    found: list[Found] = []
-    for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces):
-        try:
-            asked = list(kind())
-        except Exception as error:  # what ends so says no number
-            asked = [("log", f"a log that ends in {type(error).__name__}: {error}", math.nan, 0.0, 0.0)]
-        found += [
-            (name, value, (wanted - within, wanted + within), what)
-            for name, what, value, wanted, within in asked if not abs(value - wanted) <= within
-        ]  # fmt: skip
-    return tuple(found)
+    return tuple(
+        (name, value, (wanted - within, wanted + within), what)
+        for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces)
+        for name, what, value, wanted, within in rows_of(kind, _failed)
+        if not abs(value - wanted) <= within
+    )
+
+
+def _failed(why: str) -> Asked:
+    return "log", f"a log that ends in {why}", math.nan, 0.0, 0.0
 
 
 def _turned(t: Floats, inertia: float = INERTIA) -> Floats:

@@ -64,7 +64,7 @@ def test_a_metric_that_says_other_numbers_of_made_up_motions_is_told(
 ) -> None:
     made = MadeUp(case_of(*known_answers.UNLIKE, 1), 1)
     for name, wanted in answers(made).items():
-        monkeypatch.setattr(known_answers, "_found", lambda *_, value=wanted: value and factor * value)
+        monkeypatch.setattr(known_answers, "measured", lambda *_, value=wanted: value and factor * value)
         told = {name for name, *_ in known_answers._wrong(made, answers(made))}
         assert (name in told) == bool(wanted)
 
