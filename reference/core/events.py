@@ -25,14 +25,17 @@ from crossbody.reference.core.friction import (
     has_begun,
     has_friction,
     is_dry,
+    least_slip,
     most_drift,
     slip,
+    slip_along,
     small_slip,
 )
 from crossbody.reference.core.guards import (
     CATCH,
     CONE,
     DRIFT,
+    GRAZE,
     HANDOVER,
     JAM,
     LEAVE,
@@ -251,6 +254,9 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
             if np.isnan(w.hit[i]):
                 return NOT_FINITE
             s.theta = min(s.theta, w.hit[i])
+    if s.frictional and s.theta > 1.0 and _ends_beyond_zero(s, m, w, mode):
+        s.theta = BEFORE_IT
+        return TOO_LONG
     if s.theta <= 1.0:
         _tie(s, w)
         if _leaves_early(s, w, mode):
@@ -275,6 +281,17 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
         below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s)  # not by rounding, as one that rests
         leaves = leaves or (below and w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC)
     return bool(leaves)
+
+
+@compiled
+def _ends_beyond_zero(s: Any, m: Model, w: Work, mode: Bytes) -> bool:
+    """Whether a slip passes zero, and the step ends before it is known to stop: the next one could not tell where."""
+    for i in range(s.nc):
+        if mode[i] == SLIP and has_friction(m, i) and not has_begun(w, i):
+            end, below = slip_along(m, w, i, w.rates[NODES - 1]), GRAZE * least_slip(s)
+            if -below <= end < 0.0 and slip_along(m, w, i, w.rates[0]) > below:
+                return True
+    return False
 
 
 @compiled
