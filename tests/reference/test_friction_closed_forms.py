@@ -89,7 +89,7 @@ def stops_at(kappa: float, tangent: float, speed: float, th: float) -> tuple[flo
 
 @pytest.mark.parametrize("block", range(4))
 def test_any_oblique_slide_stops_on_time(block: int) -> None:
-    """Also where a step ends just beyond the stop. A slip that counts as none may be let go where it is braked weakly."""
+    """Also where a step ends just beyond the stop. What counts as no slip may be let go where it is braked weakly."""
     rng = np.random.default_rng((75, block))
     for _ in range(25):
         kappa, tangent = 1.0 + 10.0 ** rng.uniform(-1.5, 0.5), rng.uniform(0.1, 0.8)
