@@ -165,12 +165,24 @@ def _largest(known: Sequence[tuple[EngineRun, Row]]) -> list[tuple[EngineRun, Ro
 
 def _known_until(runs: Sequence[EngineRun]) -> str:
     """Say which cases are compared in part only, since the truth is known no further; nothing if none is."""
-    short = [(run.label, row) for run in runs for row in run.rows if row["metric"] == TRUTH and row["compared"] < 1.0]
-    if not short:
-        return ""
-    return (
-        f" Compared up to the time to which the truth is known: {_named([f'{at}, {_part(row)}' for at, row in short])}."
-    )
+    short = [f"{run.label}, {_part(row)}" for run in runs for row in run.rows if is_short(row)]
+    return f" Compared up to the time to which the truth is known: {_named(short)}." if short else ""
+
+
+def is_short(row: Row) -> bool:
+    """Whether a row says that a truth is not known to the end of its horizon."""
+    return bool(row["metric"] == TRUTH and row["compared"] < 1.0)
+
+
+def known_until(rows: Iterable[Row], end: float) -> tuple[float, str]:
+    """Up to when the truth of a case is known, s, and why no further.
+
+    Args:
+        rows: of the case.
+        end: its horizon, s, which is what is returned where the truth is known to its end.
+    """
+    found = [(end * row["compared"], _why_short(row)) for row in rows if is_short(row)]
+    return min(found, default=(end, ""))
 
 
 def _counted(within: int, ran: int, known: Sequence[str]) -> str:
@@ -188,8 +200,14 @@ def _counted(within: int, ran: int, known: Sequence[str]) -> str:
 
 
 def _part(row: Row) -> str:
-    short = SHORT.search(row["why"])
-    return f"{row['compared']:.2g} of the horizon" + (f" ({short[1]})" if short else "")
+    why = _why_short(row)
+    return f"{row['compared']:.2g} of the horizon" + (f" ({why})" if why else "")
+
+
+def _why_short(row: Row) -> str:
+    """Why a truth is known no further; nothing where its row does not say."""
+    said = SHORT.search(row["why"])
+    return said[1] if said else ""
 
 
 def _named(texts: Sequence[str]) -> str:

@@ -271,7 +271,10 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
         return None
     reasons = [
         (truth.trajectory.determined_until, "the law does not determine the normal forces of sliding contacts"),
-        (truth.trajectory.unique_until, "not one set alone of sticking, sliding and open contacts satisfies the law"),
+        (
+            truth.trajectory.unique_until,
+            "several sets of sticking, sliding and open contacts satisfy the law, or none is known to",
+        ),
         (_arbitrary(truth, second, case), "the law does not determine which of several dependent rows opens first"),
     ]
     if truth.parted < case.t_end and grown[-1] > MULTIPLIED:

@@ -12,7 +12,7 @@ from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import called, label, style
-from crossbody.reports.judging.told import beyond, lacking, telling
+from crossbody.reports.judging.told import beyond, known_until, lacking, telling
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.errors import farthest_off
@@ -45,8 +45,9 @@ PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit"
 def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     """All sections of one case, with a share of the usual room; its motions are forgotten with the page."""
     traces, rows = case.traces(), found.rows.get(case.label, [])
+    lead = f"{_lead(case.about)}{_compared(traces, rows)} {at_rest([case])}"
     return Page(
-        name=case.page, title=case.label, lead=f"{_lead(case.about)} {at_rest([case])}".strip(),
+        name=case.page, title=case.label, lead=lead.strip(),
         word=grid.verdict(rows),
         engines=[{"name": label(trace), "shown": called(trace), **style(trace)} for trace in traces],
         beside=_beside(found, case),
@@ -75,6 +76,18 @@ def _lead(about: Mapping[str, Any]) -> str:
     truth = f" {known} ({about['source'].rstrip('.')})." if tier else ""
     title = about["title"].rstrip(".")
     return f"{title[:1].upper()}{title[1:]}.{truth}"
+
+
+def _compared(traces: Sequence[Trace], rows: Sequence[Row]) -> str:
+    """Up to when motions are compared, where that is not to their end."""
+    until, why = known_until(rows, _end(traces))
+    if not until < _end(traces):
+        return ""
+    return f" Compared up to {until:.3g} s, as far as the truth is known{f' ({why})' if why else ''}."
+
+
+def _end(traces: Sequence[Trace]) -> float:
+    return float(traces[0].run.t[-1]) if traces else 0.0
 
 
 def _walls(found: Results, case: CaseFiles) -> dict[str, float]:
@@ -129,7 +142,8 @@ def _plots(traces: Sequence[Trace], rows: Sequence[Row], share: float) -> list[S
     if not traces:
         return []
     points, limits = figures.points_for(traces, share * PLOTTED), figures.limits_of(rows)
-    drawn = {name: figures.plots(name, traces, points, limits) for name in figures.FIGURES}
+    until, _ = known_until(rows, _end(traces))
+    drawn = {name: figures.plots(name, traces, points, limits, until) for name in figures.FIGURES}
     tables = {"motion": farthest_off(traces)}
     return [
         Section(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from math import isnan
+from math import inf, isnan
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import errors
 from crossbody.reports.pages.filled import filled
-from crossbody.reports.pages.sheet import Sheet, alike, changing, modes
+from crossbody.reports.pages.sheet import Sheet, alike, changing, modes, shaded
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import POINTS
 
@@ -376,11 +376,19 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     return sheet.done()
 
 
-def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> list[Plot]:
-    """One figure if there is anything in it; of many signals those that matter most, the others drawn folded."""
-    _, draw = FIGURES[name]
+def plots(
+    name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, until: float = inf
+) -> list[Plot]:
+    """One figure if there is anything in it; of many signals those that matter most, the others drawn folded.
+
+    It is shaded from the instant `until` on, s, up to which the truth is known.
+    """
+
+    def draw(*which: Sequence[int]) -> Figure:
+        return shaded(FIGURES[name][1](traces, points, limits, *which), until, float(traces[0].run.t[-1]))
+
     if name not in SIGNALS:
-        figure = draw(traces, points, limits)
+        figure = draw()
         return [Plot(name=f"plot-{name}", figure=figure, time=True)] if figure["data"] else []
     noun, _, more = SIGNALS[name]
     order = _ranked(name, traces, limits)[:MOST_SIGNALS]
@@ -388,10 +396,10 @@ def plots(name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limi
         return []
     cut = FIRST[name] if len(order) > FIRST[name] + 1 else len(order)
     first, rest = sorted(order[:cut]), sorted(order[cut:])
-    found = [Plot(name=f"plot-{name}", figure=draw(traces, points, limits, first), time=True)]
+    found = [Plot(name=f"plot-{name}", figure=draw(first), time=True)]
     if rest:
         told = f"{len(rest)} more {noun} {more}: {', '.join(_names(traces, noun)[k] for k in rest)}"
-        figure = draw(traces, points, limits, rest)
+        figure = draw(rest)
         found.append(Plot(name=f"plot-{name}-more", figure=figure, time=True, folded=told))
     return found
 

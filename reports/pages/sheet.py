@@ -35,6 +35,7 @@ MODE_COLOURS = {
     Mode.COLLISION_SEPARATION: "#CC79A7", Mode.BILATERAL: "#009E73",
     Mode.STICK: "#56B4E9", Mode.SLIP: "#F0E442",
 }  # fmt: skip
+VEIL = "rgba(136,136,136,.14)"  # over what is not known: seen on light and on dark pages
 LINE = 20  # letters of a title in one line
 LONGEST = 150  # intervals of one mode in one bar; of more, the longest are drawn
 
@@ -189,6 +190,17 @@ class Sheet:
                 axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 9, "exponentformat": "power"}
             top += heights[i] + below[i]
         return axes, TOP + inside + BOTTOM
+
+
+def shaded(figure: Figure, until: float, end: float) -> Figure:
+    """Shade a figure over time from when on the truth is not known, s, to its end, and say so in its title."""
+    if not (until < end and figure["data"]):
+        return figure
+    layout = figure["layout"]
+    title = {"text": f"{layout['title']['text']}. Shaded: the truth is known up to {until:.3g} s only"}
+    veil = {"type": "rect", "x0": until, "x1": end, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": {"width": 0},
+            "fillcolor": VEIL, "layer": "below"}  # fmt: skip
+    return figure | {"layout": layout | {"title": title, "shapes": [*layout.get("shapes", ()), veil]}}
 
 
 def broken(t: Floats, y: Floats, floor: float, more: Sequence[int] | NDArray[np.intp] = ()) -> tuple[Floats, Floats]:

@@ -67,6 +67,18 @@ def test_a_rotation_that_is_off_most_is_seen_first() -> None:
     assert "qx" not in note("motion", traces)
 
 
+@pytest.mark.parametrize("until", [0.25, 1.0])
+def test_what_is_not_known_is_shaded_to_the_end(until: float) -> None:
+    q = np.random.default_rng(2).normal(size=(2, 30, 8))
+    for plot in plots("motion", motions([*q], ["m"] * 8), until=until):
+        layout = plot.figure["layout"]
+        veils = [one for one in layout["shapes"] if one["type"] == "rect"]
+        assert [(one["x0"], one["x1"], one["yref"]) for one in veils] == (
+            [(until, 1.0, "paper")] if until < 1.0 else []
+        )
+        assert ("the truth is known up to 0.25 s only" in layout["title"]["text"]) == (until < 1.0)
+
+
 def test_nothing_compared_is_no_error() -> None:
     q = np.ones((5, 2))
     traces = motions([q, q], ["m", "rad"])

@@ -10,7 +10,7 @@ import pytest
 
 from crossbody.reports.importers.compare import OK, QUANTITIES, Row
 from crossbody.reports.importers.told import grid
-from crossbody.reports.judging.told import NAMED, runs_of, sentence
+from crossbody.reports.judging.told import NAMED, known_until, runs_of, sentence
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.pages import grid as pages_grid
 
@@ -98,6 +98,8 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
 def test_the_sentence_says_why_a_truth_is_known_in_part(why: str, said: str) -> None:
     rows = [row("fake:one", Word.WITHIN), row("truth:", Word.WITHIN, "truth", why=why, compared=0.2)]
     assert f"ball:hard, 0.2 of the horizon{said}." in sentence(runs_of(rows))
+    assert known_until(rows, 3.0) == (pytest.approx(0.6), said.strip(" ()"))
+    assert known_until(rows[:1], 3.0) == (3.0, "")
 
 
 @pytest.mark.parametrize("seed", range(20))
