@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Mode
 from crossbody.cases.arrays import Floats, distinct
@@ -163,9 +164,11 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
     cone = [_line(one, (forces[j][0][:, 0], forces[j][1]), most) for j, one in enumerate(traces)]
     plane = [_line(one, forces[j][2], most) for j, one in enumerate(traces)]
     top = max(float(np.nanmax(rows[:, 0], initial=0.0)) for rows, *_ in forces)
+    ends, far = robust(traces, list(traces[0].about["contacts"]).index(name))
+    title = f"Friction over normal force, {name}. Dashed: the bound, mu = {contact.friction:g}{_beyond(far, name)}"
     plots = [
-        _plot("cone", i, f"Friction over normal force, {name}. Dashed: the bound, mu = {contact.friction:g}", cone,
-              ("normal force [N]", "|friction| [N]"), [_edge(contact.friction, top)], name),
+        _plot("cone", i, title, cone, ("normal force [N]", "|friction| [N]"), [_edge(contact.friction, top)], name,
+              _ranges((0.0, ends[1]), contact.friction) if ends else None),
         _plot("plane", i, f"Friction over its bound in the plane, {name}. Dashed: the cone's edge", plane,
               ("friction t1 / bound", "friction t2 / bound"), [DISC], name),
     ]  # fmt: skip
@@ -173,6 +176,17 @@ def _rubbing(traces: Sequence[Trace], contact: Contact, place: int, most: int, i
         slips = [_line(trace, _slipping(trace, contact, place), most) for trace in traces]
         plots.append(_plot("slip", i, f"Slip, {name}", slips, ("slip t1 [m/s]", "slip t2 [m/s]"), [], name))
     return plots
+
+
+def _beyond(far: Mapping[str, float], contact: str) -> str:
+    """Say which engines go beyond the scale of a plot of forces."""
+    return f". Off scale: {off_scale({who: [(size, 'N', contact)] for who, size in far.items()})}" if far else ""
+
+
+def _ranges(loads: tuple[float, float], mu: float) -> tuple[list[float], list[float]]:
+    """Ranges of a normal force, and of friction up to twice its bound there."""
+    low, high = loads
+    return [low, high], [low, 2.0 * mu * high]
 
 
 def _pressed(traces: Sequence[Trace]) -> list[tuple[Contact, int]]:
@@ -213,25 +227,39 @@ def _slipping(trace: Trace, contact: Contact, place: int) -> tuple[Floats, Float
 
 
 def _line(trace: Trace, points: tuple[Floats, Floats], most: int) -> dict[str, Any]:
-    """A line of one engine through evenly chosen samples and those beside its events."""
+    """A line of one engine through samples even in number and along its way, and those beside its events."""
     x, y = points
     near = np.searchsorted(trace.run.t, [event.t for event in trace.run.events])[: most // 4]
-    at = distinct(np.linspace(0, len(x) - 1, min(len(x), most)).astype(int), near, near + 1)
+    at = distinct(_even(x, y, most), near, near + 1)
     free = ~np.isfinite(x + y)
     at = np.r_[at, np.flatnonzero(free[1:] & ~free[:-1]) + 1]  # a line ends where a contact opens
     at = distinct(at[(at >= 0) & (at < len(x))])
-    return _drawn(trace, x[at], y[at], "lines+markers", marker={"size": 4})
+    told = np.cumsum(np.diff(trace.run.t, prepend=-np.inf) == 0.0)  # both sides of an event
+    jumps = np.flatnonzero(np.diff(told[at])) + 1
+    x, y = (np.insert(each[at], jumps, np.nan) for each in points)
+    return _drawn(trace, x, y, "lines+markers", marker={"size": 4})
+
+
+def _even(x: Floats, y: Floats, most: int) -> NDArray[np.intp]:
+    """At most so many samples, as even in number as along the line."""
+    if len(x) <= most:
+        return np.arange(len(x))
+    way = np.cumsum(np.nan_to_num(np.hypot(np.diff(x, prepend=x[:1]), np.diff(y, prepend=y[:1]))))
+    even = np.arange(len(x)) / len(x) + way / (way[-1] or 1.0)
+    return np.searchsorted(even, np.linspace(0.0, even[-1], most))
 
 
 def _plot(
     kind: str, i: int, title: str, lines: list[dict[str, Any]], axes: tuple[str, str],
-    shapes: list[dict[str, Any]], contact: str,
+    shapes: list[dict[str, Any]], contact: str, ranges: tuple[list[float], list[float]] | None = None,
 ) -> Plot:  # fmt: skip
     x, y = axes
+    within = [{"range": each} for each in ranges] if ranges else [{}, {}]
     layout = {
         "title": {"text": title}, "height": 420, "showlegend": False, "shapes": shapes,
-        "xaxis": {"title": {"text": x}, "exponentformat": "power"},
-        "yaxis": {"title": {"text": y}, "exponentformat": "power"} | ({} if kind == "cone" else {"scaleanchor": "x"}),
+        "xaxis": {"title": {"text": x}, "exponentformat": "power"} | within[0],
+        "yaxis": {"title": {"text": y}, "exponentformat": "power"} | within[1]
+        | ({} if kind == "cone" else {"scaleanchor": "x"}),
     }  # fmt: skip
     figure = {"data": lines, "layout": layout}
     return Plot(name=_numbered(f"plot-friction-{kind}", i), figure=figure, choice=contact)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from unpacked import numbers
 
-from crossbody.cases import Mode, load
+from crossbody.cases import Mode, Trajectory, load
 from crossbody.cases.scene_contacts import contacts
 from crossbody.engines import load as load_engine
 from crossbody.reports.measuring.friction import rubbing
@@ -110,6 +110,13 @@ def test_without_friction_there_is_no_such_section() -> None:
     assert friction([Trace(about=study._about(case, "reference", "compiled"), run=run)]) == []
 
 
+def at_instants(trace: Trace, t: np.ndarray) -> Trace:
+    """A trace with samples at these instants, of which nothing is asked but when they are."""
+    n, none = len(t), np.zeros((len(t), 0))
+    run = Trajectory(t=t, q=none, v=none, gap=none, lam=none, energy=np.zeros((n, 2)), mode=none.astype(np.int8))
+    return replace(trace, run=run)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_line_of_friction_ends_wherever_its_contact_opens(trace: Trace, seed: int) -> None:
     """Between two samples that are drawn it was pressed throughout."""
@@ -117,6 +124,20 @@ def test_a_line_of_friction_ends_wherever_its_contact_opens(trace: Trace, seed: 
     n = 4000
     pressed = np.repeat(rng.uniform(size=n // 4) > 0.1, 4)
     x = np.where(pressed, np.arange(n, dtype=float), np.nan)
-    for a, b in pairwise(numbers(_line(trace, (x, x), 100)["x"])):
+    for a, b in pairwise(numbers(_line(at_instants(trace, np.linspace(0.0, 1.0, n)), (x, x), 100)["x"])):
         if np.isfinite(a) and np.isfinite(b):
             assert pressed[int(a) : int(b) + 1].all()
+
+
+def test_a_line_is_round_where_few_of_many_samples_turn_and_broken_at_a_jump(trace: Trace) -> None:
+    """A force that turns around the cone within a hundredth of its samples, and jumps to the other side at an event."""
+    n = 4000
+    turned = np.pi * np.clip((np.arange(n) - 2000) / 40.0, 0.0, 1.0)
+    t = np.linspace(0.0, 1.0, n)
+    t[3001] = t[3000]
+    x, y = np.where(np.arange(n) > 3000, -1.0, 1.0) * (np.cos(turned), np.sin(turned))
+    line = _line(at_instants(trace, t), (x, y), 200)
+    drawn = np.column_stack([numbers(line[axis]) for axis in "xy"])
+    chords = np.linalg.norm(np.diff(drawn, axis=0), axis=1)
+    assert np.nanmax(chords) < 0.3
+    assert np.isnan(drawn).any(axis=1).sum() == 1
