@@ -72,6 +72,7 @@ def run(
         clock.append(perf_counter())
         with output.folder(out, "run") as made:
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
+            _check_any(rows)  # before an earlier report is replaced
             # Pages take longer than all but the engines: what they show is printed before them, and lost by nothing.
             times, rests = results.times_of(made)
             untold = _tell(rows, times, made, controlled=any(case.control is not None for case in cases))
@@ -90,7 +91,6 @@ def run(
     if not voice.silent():
         show_time([*clock, perf_counter()], times, count.seconds - compiled)
     where(out)
-    _check_any(rows)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
 
