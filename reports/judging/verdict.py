@@ -20,6 +20,8 @@ ROUNDING = 1e-12
 """Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
 LACKS = "The run lacks this number, which the truth has."
+UNMEASURED = "Known, but its size has not been measured here: "
+"""How the reason of a number begins that is beyond its limit, nobody knows how far it may be."""
 IDENTITIES = frozenset(
     {
         "start_error",
@@ -172,7 +174,7 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     if limit is None or not known:
         return Word.OUTSIDE, (said + why).strip()
     if sizes is None:
-        return Word.INFO, f"Known, but its size has not been measured here: {limit.known}"
+        return Word.INFO, f"{UNMEASURED}{limit.known}"
     least, most = sizes
     if least <= off <= most:
         return Word.EXPECTED, limit.known

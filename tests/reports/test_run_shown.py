@@ -70,7 +70,9 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
     ]
     text = sentence(runs_of(rows))
     assert text.startswith("1 of 2 runs is within all limits. Without a limit: c:matched on ball:v.")
-    assert text.endswith("cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
+    assert text.endswith(
+        "cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason."
+    )
     shown = click.unstyle(run_shown.table(runs_of(rows), {}, 200)).splitlines()
     assert [shown[0].split()[-2:], *(line.split()[-2:] for line in shown[2:])] == [
         ["beyond", "outside"], ["0", "0"], ["2", "0"], ["0", "0"]
