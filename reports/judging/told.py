@@ -14,7 +14,7 @@ from crossbody.reports.layout import unit_text, valid
 from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
-SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$)")
+SHORT = re.compile(r"(?:Followed|Known up) to (.*? s)(?: of .*? s)?: (.*?)\.(?: |$)")
 """What a truth's row says of a horizon shorter than was asked for, or a motion known in part."""
 FINISHED = "finished"  # the row that says whether a run came to its end
 _CLAUSE = re.compile(r"[:;,.](?:\s|$)")
@@ -198,14 +198,15 @@ def _counted(within: int, ran: int, known: Sequence[str]) -> str:
 
 
 def _part(row: Row) -> str:
-    why = _why_short(row)
-    return f"{row['compared']:.2g} of the horizon" + (f" ({why})" if why else "")
+    said = SHORT.search(row["why"])
+    part = f"{row['compared']:.2g} of the horizon"
+    return f"{said[1]}, {part} ({said[2]})" if said else part
 
 
 def _why_short(row: Row) -> str:
     """Why a truth is known no further; nothing where its row does not say."""
     said = SHORT.search(row["why"])
-    return said[1] if said else ""
+    return said[2] if said else ""
 
 
 def _named(texts: Sequence[str]) -> str:

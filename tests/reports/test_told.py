@@ -98,15 +98,17 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
 @pytest.mark.parametrize(
     ("why", "said"),
     [
-        ("Known up to 0.2 s: more than one set keeps the law. Compiled.", " (more than one set keeps the law)"),
-        ("Compiled. Followed to 0.39 s of 1 s: more takes longer.", " (more takes longer)"),
-        ("Compiled at 1e-12 agrees.", ""),
+        ("Known up to 0.2 s: more than one set keeps the law. Compiled.", ("0.2 s", "more than one set keeps the law")),
+        ("Compiled. Followed to 0.39 s of 1 s: more takes longer.", ("0.39 s", "more takes longer")),
+        ("Compiled at 1e-12 agrees.", ("", "")),
     ],
 )
-def test_the_sentence_says_why_a_truth_is_known_in_part(why: str, said: str) -> None:
+def test_the_sentence_says_why_a_truth_is_known_in_part(why: str, said: tuple[str, str]) -> None:
     rows = [row("fake:one", Word.WITHIN), row("truth:", Word.WITHIN, "truth", why=why, compared=0.2)]
-    assert f"ball:hard, 0.2 of the horizon{said}." in sentence(runs_of(rows))
-    assert known_until(rows, 3.0) == (pytest.approx(0.6), said.strip(" ()"))
+    until, reason = said
+    part = f"{until}, 0.2 of the horizon ({reason})" if until else "0.2 of the horizon"
+    assert f"ball:hard, {part}." in sentence(runs_of(rows))
+    assert known_until(rows, 3.0) == (pytest.approx(0.6), reason)
     assert known_until(rows[:1], 3.0) == (3.0, "")
 
 
