@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -28,7 +28,7 @@ UNLIMITED = ("creep_speed", "lam_error", "lam_impulse")
 """Metrics that controls look at, and that are limited in some cases only."""
 
 
-def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
+def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> Iterator[Verdict]:
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
     from crossbody.reports.judging import known
     from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
@@ -53,7 +53,7 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
         )
 
     for name, value, (least, most), fault in (
-        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(file=bool(case.file)),
+        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(file=bool(case.file), ran=ran),
     ):  # fmt: skip
         if least <= value <= most:
             why = f"A control passes: {fault} is no number outside."
