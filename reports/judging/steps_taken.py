@@ -18,6 +18,8 @@ from crossbody.cases.arrays import distinct
 
 GRID = 1e-6
 """Part of a step by which an instant may be off its grid, and a step longer than it is."""
+IDLE = 0.01
+"""Part of all steps that may be cut where something is located that then changes nothing, and is no event."""
 
 
 def miscounted(case: Case, settings: Mapping[str, Any], run: Trajectory) -> Iterator[tuple[float, float, str]]:
@@ -33,7 +35,7 @@ def miscounted(case: Case, settings: Mapping[str, Any], run: Trajectory) -> Iter
         return
     end = float(run.t[-1])
     least = max(1, math.ceil(end / dt - GRID))
-    most = max(least, math.ceil(end / dt + GRID)) + len(run.events) + len(run.switches) + _cuts(case, end)
+    most = math.ceil((1.0 + IDLE) * end / dt + GRID) + len(run.events) + len(run.switches) + _cuts(case, end)
     if not least <= run.steps <= most:
         wanted = least if run.steps < least else most
         yield run.steps, wanted, f"{end:.6g} s are {least} steps of {dt:.6g} s, and {most - least} instants cut some."
