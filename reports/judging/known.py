@@ -34,8 +34,8 @@ OF_FILES = ("judging.known_files",)
 OF_ENGINES = "judging.known_engines"
 """Of an engine that runs, beside: others are not imported for it."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay", "replay.known_formats"), "bench": ("bench.known_bench",), "analyse": ("analysis.known_analysis",),
-    "picture": ("pages.known_pictures",),
+    "replay": ("replay.known_replay", "replay.known_formats"), "bench": ("bench.known_bench",),
+    "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
 }  # fmt: skip
 """Of commands that judge no run: they ask before they say a number."""
 RUNS = "known_answers"

@@ -40,6 +40,8 @@ MASS, GAIN, LAG, AT, FAST = 1.3, 7.0, 0.03, 0.2, -0.4
 """Of what is pushed: kg; N; s; and where it is at first, m, and how fast, m/s."""
 TICK, CONTROLS, FINE = 0.02, (0.8, -0.6, 0.9, -1.0, 0.7), 40
 """Time between controls, s, the controls, and how many steps an engine with a step of its own is given in it."""
+STIFF, MOST, FAR = 40.0, 6.0, 0.5
+"""Of a servo: N/m, the largest force, N, and how far it has to go, m."""
 OF_ORDER_ONE, TIGHTLY, FIT = 0.1, 1e-6, 1e-9
 """Part of what a control does in its tick by which engines of first order may be off, and any other engine; and their
 tolerance, and by which part of it instants may be off."""
@@ -60,7 +62,7 @@ def wrong(name: str) -> tuple[Found, ...]:
     def failed(why: str) -> Found:
         return name, math.nan, (0.0, 0.0), f"a motion in closed form, which ends in {why}"
 
-    asks = (_tolerances, _settings, _controlled)
+    asks = (_tolerances, _settings, _controlled, _clamped)
     profiles = [profile for profile in own.profiles if profile not in OTHERS]
     return tuple(found for profile in profiles for ask in asks for found in rows_of(partial(ask, own, profile), failed))
 
@@ -115,16 +117,16 @@ def _settings(engine: engines.Engine, profile: str) -> Iterator[Found]:
         return
 
 
-def _driven(control: Control) -> Case:
+def _on_a_rail(motor: Actuator, at: float, fast: float, t_end: float, control: Control | None = None) -> Case:
     body = Body(name="cart", mass=MASS, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
     joint = Joint(name="rail", body="cart", type="slide", axis=(1.0, 0.0, 0.0))
-    motor = Actuator(
-        name="motor", joint="rail", gain=(GAIN, 0.0, 0.0), activation="filter", time_constant=LAG
-    )  # fmt: skip
     scene = Scene(bodies=(body,), joints=(joint,), actuators=(motor,), gravity=(0.0, 0.0, 0.0))
-    return case_of(
-        scene, name="driven", q0=[AT], v0=[FAST], t_end=TICK * len(CONTROLS), control=control
-    )  # fmt: skip
+    return case_of(scene, name="driven", q0=[at], v0=[fast], t_end=t_end, control=control)
+
+
+def _driven(control: Control) -> Case:
+    motor = Actuator(name="motor", joint="rail", gain=(GAIN, 0.0, 0.0), activation="filter", time_constant=LAG)
+    return _on_a_rail(motor, AT, FAST, TICK * len(CONTROLS), control)
 
 
 def motion() -> Floats:
@@ -163,3 +165,23 @@ def _controlled(engine: engines.Engine, profile: str) -> Iterator[Found]:
         for what, found, must, off in pairs:
             if not abs(found - must) <= off:
                 yield f"{name} ({what})", found, (must - off, must + off), said
+
+
+def _clamped(engine: engines.Engine, profile: str) -> Iterator[Found]:
+    """Ask for a mass that a servo pulls back, by no more than it can until it is near: a parabola, then a wave."""
+    near, rate = MOST / STIFF, math.sqrt(STIFF / MASS)
+    late = math.sqrt(2.0 * MASS * (FAR - near) / MOST)
+    arrives, left = -MOST / MASS * late, 0.25 * math.pi / rate
+    motor = Actuator(
+        name="servo", joint="rail", gain=(STIFF, 0.0, 0.0), bias=(0.0, -STIFF, 0.0), force_range=(-MOST, MOST)
+    )  # fmt: skip
+    case = _on_a_rail(motor, FAR, 0.0, late + left)
+    if (run := _run(engine, profile, case, rtol=FIT, dt=left / FINE)) is None:
+        return
+    cos, sin = math.cos(rate * left), math.sin(rate * left)
+    wanted = near * cos + arrives / rate * sin, arrives * cos - near * rate * sin
+    for what, found, must in zip("qv", (run.q[-1, 0], run.v[-1, 0]), wanted, strict=True):
+        off = abs(arrives) * (late if what == "q" else 1.0)
+        off *= TIGHTLY if "rtol" in engine.offered(case, profile) else OF_ORDER_ONE
+        if not abs(found - must) <= off:
+            yield f"{engine.name}:{profile} ({what})", float(found), (must - off, must + off), "a servo at its bound"

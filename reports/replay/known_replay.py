@@ -293,13 +293,16 @@ FALLS = (0.117, 0.31, 0.4852)
 
 def _fallen(t: Floats, hits: tuple[float, ...]) -> Floats:
     """Return a motion (n, 1) whose rate changes by so much at each of some instants, of the same ones but once."""
-    return np.sum([HEIGHT * np.maximum(t - hit, 0.0) for hit in sorted(set(hits))], axis=0)[:, None]
+    bent: Floats = np.sum([HEIGHT * np.maximum(t - hit, 0.0) for hit in sorted(set(hits))], axis=0)
+    return bent[:, None]
 
 
 def _impacts() -> Iterator[Asked]:
     """Yield when impacts are, and how strong, of a motion that is straight between them."""
-    t, jumps = STEP * np.arange(62), np.array([4.0, 3.0, 2.5])
-    y = -SPEED * t + np.sum([jump * np.maximum(t - hit, 0.0) for hit, jump in zip(FALLS, jumps, strict=True)], axis=0)
+    t, jumps = STEP * np.arange(62, dtype=np.float64), np.array([4.0, 3.0, 2.5])
+    y: Floats = -SPEED * t + np.sum(
+        [jump * np.maximum(t - hit, 0.0) for hit, jump in zip(FALLS, jumps, strict=True)], axis=0
+    )
     found, told = rates.impacts(t, y, 0.2 * jumps[-1] / STEP), "a motion with three impacts"
     yield "impacts", told, float(len(found.t)), float(len(FALLS)), 0.0
     for k, (hit, jump) in enumerate(zip(FALLS, jumps.tolist(), strict=True)):

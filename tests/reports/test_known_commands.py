@@ -19,7 +19,7 @@ from crossbody.reports.bench import known_bench, measure
 from crossbody.reports.cli import cli
 from crossbody.reports.judging import known
 from crossbody.reports.pages import known_pictures
-from crossbody.reports.replay import known_replay
+from crossbody.reports.replay import known_formats, known_replay
 
 SUPPORT = Path(__file__).parents[1] / "support"
 LOG = (str(SUPPORT / "falling_ball.csv"), "--columns", str(SUPPORT / "falling_ball.toml"), "-m", "ball", "-q")
@@ -77,3 +77,18 @@ def test_a_number_that_is_off_is_told(what: str, monkeypatch: pytest.MonkeyPatch
         for cached in ("wrong", "_link_log", "_hanging"):
             if hasattr(module, cached):
                 getattr(module, cached).cache_clear()
+
+
+@pytest.mark.parametrize("column", ["t", "angle"])
+def test_a_log_that_is_read_as_another_one_is_told(column: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    library, write, before = known_formats.WRITERS["log.mat"]
+
+    def other(path: Path, data: known_formats.Table) -> None:
+        write(path, data | {column: data[column] * (1.0 + 1e-12)})
+
+    known_formats.wrong.cache_clear()
+    assert known_formats.wrong() == ()
+    monkeypatch.setitem(known_formats.WRITERS, "log.mat", (library, other, before))
+    known_formats.wrong.cache_clear()
+    assert {what for *_, what in known_formats.wrong()} == {"log.mat"}
+    known_formats.wrong.cache_clear()
