@@ -36,6 +36,7 @@ OF_ENGINES = "judging.known_engines"
 OF_COMMANDS = {
     "replay": ("replay.known_replay", "replay.known_formats"), "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
+    "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps",),
 }  # fmt: skip
 """Of commands that judge no run: they ask before they say a number."""
 RUNS = "known_answers"
