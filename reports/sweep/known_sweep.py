@@ -22,7 +22,7 @@ from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.suites.axis import Levels, Linear, Log, Whole
-from crossbody.reports.sweep.execute import ACCOUNT, Tried, row
+from crossbody.reports.sweep.execute import Tried, row
 from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, residual
 from crossbody.reports.sweep.spec import Spec
 
@@ -31,6 +31,10 @@ Asks = tuple[str, str, float, float, float]
 """Of what, of which run, the number, what it must be, and by how much it may be off."""
 OFF, LIMIT, EXACT = 1e-4, 1e-6, 1e-9
 """By which part a run is off; the largest error that its judge allows; and what sums in another order differ by."""
+
+
+OPEN = 40.0
+"""How many times as much an account that is open leaves: ten would be a sum of all steps' errors."""
 
 
 @cache
@@ -104,7 +108,7 @@ def _words() -> Iterator[Asks]:
     case, exact = _exact()
     none = Ledger(contact=np.zeros((len(exact.t), 1)), input=np.zeros(len(exact.t)), dissipated=np.zeros(len(exact.t)))
     still = replace(exact, ledger=none, energy=np.ones((len(exact.t), 2)))
-    open_ = replace(still, energy=still.energy + np.linspace(0.0, 4.0 * ACCOUNT * LIMIT, len(exact.t))[:, None])
+    open_ = replace(still, energy=still.energy + np.linspace(0.0, OPEN * LIMIT, len(exact.t))[:, None])
     off, near = (Error(value=times * LIMIT, tier="A", until=case.t_end) for times in (2.0, 0.5))
     done: dict[str, Any] = {"outcome": Outcome.FINISHED.value, "case": case}
     lost = np.where(np.arange(len(exact.t))[:, None] == 1, np.nan, exact.q)
