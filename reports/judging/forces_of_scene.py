@@ -38,10 +38,15 @@ LENGTHS = ("slide", "hinge")
 @remembered(2)
 def forces_of_scene(case: Case) -> tuple[AuditRow, ...]:
     """Return rows for the parity audit of a scene with motors or dampers: their forces at states beside the start."""
-    scene, system = case.scene, equations(case)
-    if not case.general or scene is None or system is None or case.force or case.form or case.gates:
-        return ()
-    own = Forces(scene)
+    system = equations(case)
+    plain = case.general and not (case.force or case.form or case.gates)
+    return forces_against(case, system) if plain and system is not None else ()
+
+
+def forces_against(case: Case, system: System) -> tuple[AuditRow, ...]:
+    """Return the same rows of equations that may be others' (as `forces_of_scene` of the case's own)."""
+    assert case.scene is not None
+    own = Forces(case.scene)
     rows = []
     if own.driven:
         rows.append(_compared("forces of motors", *_of_motors(case, system, own)))

@@ -19,7 +19,7 @@ from functools import cache, partial
 import numpy as np
 
 from crossbody import cases, engines
-from crossbody.cases import Case, CaseUnsupported, Outcome, Trajectory, Value
+from crossbody.cases import Case, CaseUnsupported, Inputs, Outcome, Trajectory, Value
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Law
 from crossbody.cases.control import Control
@@ -40,6 +40,8 @@ MASS, GAIN, LAG, AT, FAST = 1.3, 7.0, 0.03, 0.2, -0.4
 """Of what is pushed: kg; N; s; and where it is at first, m, and how fast, m/s."""
 TICK, CONTROLS, FINE = 0.02, (0.8, -0.6, 0.9, -1.0, 0.7), 40
 """Time between controls, s, the controls, and how many steps an engine with a step of its own is given in it."""
+RISES, FULL, FILLS = 9.0, 0.5, 10
+"""Rate at which a motor's activation changes, 1/s, the end of its range, and for how many ticks."""
 STIFF, MOST, FAR = 40.0, 6.0, 0.5
 """Of a servo: N/m, the largest force, N, and how far it has to go, m."""
 OF_ORDER_ONE, TIGHTLY, FIT = 0.1, 1e-6, 1e-9
@@ -62,7 +64,7 @@ def wrong(name: str) -> tuple[Found, ...]:
     def failed(why: str) -> Found:
         return name, math.nan, (0.0, 0.0), f"a motion in closed form, which ends in {why}"
 
-    asks = (_tolerances, _settings, _controlled, _clamped)
+    asks = (_tolerances, _settings, _controlled, _clamped, _filled)
     profiles = [profile for profile in own.profiles if profile not in OTHERS]
     return tuple(found for profile in profiles for ask in asks for found in rows_of(partial(ask, own, profile), failed))
 
@@ -185,3 +187,37 @@ def _clamped(engine: engines.Engine, profile: str) -> Iterator[Found]:
         off *= TIGHTLY if "rtol" in engine.offered(case, profile) else OF_ORDER_ONE
         if not abs(found - must) <= off:
             yield f"{engine.name}:{profile} ({what})", float(found), (must - off, must + off), "a servo at its bound"
+
+
+def _filled(engine: engines.Engine, profile: str) -> Iterator[Found]:
+    """Ask for a mass whose motor's force grows until it is held at the end of its range, and falls again behind.
+
+    Its acceleration changes at a steady rate from one of three instants to the next; controls are recorded, or a
+    controller's.
+    """
+
+    def control(t: float, q: Floats, v: Floats) -> float:
+        return RISES if t < half - FIT else -RISES
+
+    motor = Actuator(
+        name="motor", joint="rail", gain=(GAIN, 0.0, 0.0), activation="integrator", activation_range=(-1.0, FULL)
+    )  # fmt: skip
+    half = 0.5 * TICK * FILLS
+    given = Inputs(names=("motor",), times=np.array([0.0, half]), values=np.array([[RISES], [-RISES]]))
+    plain = _on_a_rail(motor, AT, FAST, 2.0 * half)
+    x, v, a = AT, FAST, 0.0
+    for lasts, rate in ((FULL / RISES, RISES), (half - FULL / RISES, 0.0), (half, -RISES)):
+        push, grows = GAIN / MASS * a, GAIN / MASS * rate
+        x += v * lasts + push * lasts**2 / 2.0 + grows * lasts**3 / 6.0
+        v, a = v + push * lasts + grows * lasts**2 / 2.0, a + rate * lasts
+    for said, case in (
+        ("recorded", replace(plain, inputs=given)),
+        ("a controller's", _on_a_rail(motor, AT, FAST, 2.0 * half, Control(function=control, tick=TICK))),
+    ):  # fmt: skip
+        if (run := _run(engine, profile, case, rtol=FIT, dt=TICK / FINE)) is None:
+            continue
+        off = GAIN / MASS * half * (TIGHTLY if "rtol" in engine.offered(case, profile) else OF_ORDER_ONE)
+        for what, found, must, most in (("q", run.q[-1, 0], x, off * half), ("v", run.v[-1, 0], v, off)):
+            if not abs(found - must) <= most:
+                told = f"a motor that is full, whose controls are {said}"
+                yield f"{engine.name}:{profile} ({what})", float(found), (must - most, must + most), told
