@@ -22,11 +22,12 @@ from crossbody import hw
 from crossbody.cases import Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.hw import Comparison, Log
+from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.reading.columns import parse_columns
 from crossbody.hw.reading.stream import Rows, join
 from crossbody.hw.replaying import measures
 from crossbody.hw.windows import rates
-from crossbody.hw.windows.whiteness import noise_level
+from crossbody.hw.windows.whiteness import autocorrelation, noise_level
 from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.planted import Range
 
@@ -97,7 +98,7 @@ def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
     return tuple(
         (name, value, (wanted - within, wanted + within), what)
-        for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces, _impacts, _needed)
+        for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces, _impacts, _needed, _looked)
         for name, what, value, wanted, within in rows_of(kind, _failed)
         if not abs(value - wanted) <= within
     )
@@ -325,3 +326,19 @@ def _needed() -> Iterator[Asked]:
     told = "the link of known torques"
     yield "torque that is needed", told, float(np.max(off)), 0.0, 1e-3 * max(map(abs, TORQUES))
     yield "instants of torques", told, float(t[0]), 6.0 * STEP, EXACT
+
+
+def _looked() -> Iterator[Asked]:
+    """Yield what is found of clocks that drop samples or stand still, and how wide the band of a white residual is."""
+    even = STEP * np.arange(60, dtype=np.float64)
+    for what, times, check, count in (
+        ("a clock without fault", even, "dropped", 0), ("one sample that is lost", np.delete(even, 31), "dropped", 1),
+        ("two that are lost apart", np.delete(even, [20, 41]), "dropped", 2),
+        ("a time that stands twice", np.insert(even, 9, even[9]), "time", 1),
+    ):  # fmt: skip
+        clock = ClockCheck(STEP)
+        clock.see(np.arange(len(times)), times)
+        found = [one.count for one in clock.findings() if one.check == check]
+        yield f"{check} samples", what, float(sum(found)), float(count), 0.0
+    draw = np.random.default_rng(9).normal(size=400)
+    yield "band", "a white residual", autocorrelation(draw).band, 2.5758293035489 / 20.0, 1e-6
