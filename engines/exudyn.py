@@ -151,10 +151,10 @@ def _simulation(case: Case, used: Mapping[str, Any]) -> tuple[Any, Any]:
 
 
 def _set(settings: Any, solver: Any) -> dict[str, Any]:
-    """Return settings as Exudyn's solver is given them; its steps divide the horizon."""
+    """Return settings as Exudyn's solver is given them; fixed steps divide the horizon, and are counted."""
     time = settings.timeIntegration
     if solver == exu.DynamicSolverType.GeneralizedAlpha:
-        return {"dt": float(time.endTime) / int(time.numberOfSteps)}
+        return {}
     if float(time.absoluteTolerance) != ATOL_PART * float(time.relativeTolerance):
         return {"rtol": math.nan}
     return {"rtol": float(time.relativeTolerance), "method": solver.name}
