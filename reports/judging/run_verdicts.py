@@ -20,6 +20,7 @@ from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
+from crossbody.reports.judging.steps_taken import miscounted
 from crossbody.reports.judging.stored import Deviations, changed, defaults, deviations, differing, lacking, words
 from crossbody.reports.judging.verdict import (
     IDENTITIES,
@@ -261,8 +262,7 @@ def verdicts(
     if entry.run is None:
         return [judge_.row("run", math.nan, "", Word.SKIPPED, entry.skipped)]
     rows = [finished(judge_, entry.run), *_defaults(judge_)]
-    for value, why in () if entry.clock is None else mistimed(entry.clock, entry.run, entry.took_s):
-        rows.append(judge_.row("time (control)", value, "s", Word.OUTSIDE, why, tier=""))
+    rows += _outside_of_clocks(judge_, entry)
     if entry.audit:
         rows.append(audited(judge_))
         if rows[-1].verdict == Word.OUTSIDE:
@@ -273,6 +273,16 @@ def verdicts(
     rows += _measured(judge_, run, truth)
     rows += _split(judge_, {row.metric: row.value for row in rows})
     return [*rows, *_vanished(judge_, {row.metric for row in rows})]
+
+
+def _outside_of_clocks(judge_: Judge, entry: Entry) -> Iterator[Verdict]:
+    """Say which times and steps that a run reports are not those that were seen from outside."""
+    if entry.clock is None or entry.run is None:
+        return
+    for value, why in mistimed(entry.clock, entry.run, entry.took_s):
+        yield judge_.row("time (control)", value, "s", Word.OUTSIDE, why, tier="")
+    for value, wanted, why in miscounted(judge_.case, entry.settings, entry.clock.run):
+        yield judge_.row("steps (control)", value, "1", Word.OUTSIDE, why, expected=float(wanted), tier="")
 
 
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
