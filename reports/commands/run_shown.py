@@ -154,11 +154,10 @@ def _wrong(run: EngineRun, row: Row) -> str:
 def _lost(run: EngineRun, row: Row) -> str:
     if math.isnan(row["band"]):
         return f"worse than the stored run: {run.label} {row['metric']}. {row['why']}"
-    expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
-    value = (
-        f"{abs(row['value'] - expected):.4g}{unit_text(row['unit'])} from the claimed number, band {row['band']:.3g}"
-    )
-    return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"
+    off = abs(row["value"] - (0.0 if math.isnan(row["expected"]) else row["expected"]))
+    value = f"{off:.4g}{unit_text(row['unit'])} from the claimed number, band {row['band']:.3g}"
+    what = "worse than" if not off <= row["band"] else "not the number that this version of the engine gave in"
+    return f"{what} the stored run: {run.label} {run.who} {row['metric']} {value}"
 
 
 def _absent(runs: Sequence[EngineRun]) -> list[str]:
