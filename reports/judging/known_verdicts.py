@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from functools import cache
 
 from crossbody.cases import Claim, Limit, Tier
+from crossbody.reports.judging import verdict
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.verdict import Word, as_stored, band, judge, regression
 
@@ -62,7 +63,9 @@ def _words() -> Iterator[Found]:
     for bound, inside, sign in ((AGAIN, Word.EXPECTED, 1.0), (1.0 / AGAIN, Word.EXPECTED, -1.0)):
         for off, word in ((-sign * BESIDE, inside), (sign * BESIDE, Word.OUTSIDE)):
             value = bound * STORED * (1.0 + off)
-            yield from _said("a number that is given again", value, word, judge(value, known, None, STORED, AGAIN)[0])
+            yield from _said(
+                "a number that is given again", value, word, judge(value, known, None, STORED, verdict.AGAIN)[0]
+            )
     small = FACTOR * NOUGHT * (1.0 - BESIDE)
     yield from _said("a stored number that is none", 10.0 * small, Word.INFO, as_stored(10.0 * small, known, small)[0])
 
@@ -93,9 +96,9 @@ def _regressions() -> Iterator[Found]:
     """Yield deviations beside a stored one that are said to have stayed, or to have left it, where they have not."""
     near, far, large = (1.0 + 0.9 * (AGAIN - 1.0)) * STORED, (1.0 + 1.1 * (AGAIN - 1.0)) * STORED, 1.01 * BAND * STORED
     asked = (
-        ("given again", regression(near, BAND * STORED, STORED, AGAIN), "kept"),
-        ("another than the stored one", regression(far, BAND * STORED, STORED, AGAIN), "lost"),
-        ("half of the stored one", regression(0.5 * STORED, BAND * STORED, STORED, AGAIN), "lost"),
+        ("given again", regression(near, BAND * STORED, STORED, verdict.AGAIN), "kept"),
+        ("another than the stored one", regression(far, BAND * STORED, STORED, verdict.AGAIN), "lost"),
+        ("half of the stored one", regression(0.5 * STORED, BAND * STORED, STORED, verdict.AGAIN), "lost"),
         ("in its band", regression(far, BAND * STORED, STORED, FACTOR), "kept"),
         ("beyond its band", regression(large, BAND * STORED, STORED, FACTOR), "lost"),
         ("nowhere stored", regression(STORED, math.nan, None, FACTOR), ""),
