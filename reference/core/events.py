@@ -74,6 +74,7 @@ from crossbody.reference.kinds import Bytes
 
 EARLY = 0.5  # part of a step before which a gap that opens again has been below zero for too few of its places
 WITH_IT, BEFORE_IT = 1.2, 0.5  # of what a step up to an event is, that is taken anew with or without it
+MATTERS = 1e3  # times as deep as a gap is known to, from which on what presses there is looked for by shorter steps
 PULLS = 1e-6  # part of the largest force by which a contact pulls that is no rounding of where it lets go
 
 
@@ -274,14 +275,16 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
 def _leaves_early(s: Any, w: Work, mode: Bytes) -> float:
     """Where a gap that nothing presses shut, and that is below the surface, first passes out of it; NEVER if none does.
 
-    Free flight may be one step of any length: in one so long its places show nothing of when the contact presses, also
-    where another event is to come before.
+    Free flight may be one step of any length: in one so long its places show nothing of when the contact presses. Where
+    another event comes before, that counts for a gap that goes far deeper than it is known to.
     """
     first = NEVER
     for i in range(s.nc if s.method != EXACT else 0):
-        below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s)  # not by rounding, as one that rests
-        if below and w.hit[i] < first and w.kind[i] == LEAVE and mode[i] == BALLISTIC:
-            first = w.hit[i]
+        if w.kind[i] == LEAVE and mode[i] == BALLISTIC and w.hit[i] < first:
+            depth = -0.25 * w.rates[0, i] * w.hit[i] * s.hs  # of a parabola
+            below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s)  # not by rounding, as one that rests
+            if below and (w.hit[i] <= s.theta or depth > MATTERS * known(s, w)):
+                first = w.hit[i]
     return float(first)
 
 

@@ -56,7 +56,7 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             stopped = stopped or events.stops(s, m, w, i)
             drifts = drifts or w.kind[i] == guards.DRIFT
             caught = caught or w.kind[i] == guards.CATCH
-            if s.frictional and w.kind[i] == guards.RELEASE:
+            if s.frictional and w.kind[i] == guards.RELEASE and not has_friction(m, i):
                 w.let_go[i] = s.t
             if after != b.mode[i]:
                 touched = touched or b.mode[i] == FREE

@@ -88,10 +88,8 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
         w.bands[1] = 2.0 * decided_to(s) if s.frictional else 0.0
     elif kind == STOP:
         # A slip that grazes zero goes on; one that has just begun is known no better than a slip with no direction.
-        # It does so once, in however many steps it passes zero: one that has not been found to stop there stops below.
         below = small_slip(s) if has_begun(w, i) else GRAZE * least_slip(s)
-        past = -slip_along(m, w, i, w.rates[0])
-        w.bands[0] = below if past <= below else past + below
+        w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + below
     elif kind == DRIFT and 2.0 * slip(m, w, i, w.rates[0]) > most_drift(s):
         w.bands[0] = 2.0 * slip(m, w, i, w.rates[0]) - most_drift(s)  # it has been found to move: until it does so more
     elif kind == CONE:

@@ -18,6 +18,9 @@ MOVED = (1e-9, 1e-5)
 """Parts of the largest speed by which a start is moved to see how fast motions part: an error grows as either does, one
 choice that rounding makes as the first alone."""
 ALLOWED = 1e3
+KNOWN_TO = 1e-8
+"""The finest tolerance that counts: a slip below 1e-9 of the largest speed has no direction at any, and its friction is
+then either a bound or what holds it."""
 
 
 def known_until(motion: Trajectory) -> float:
@@ -44,9 +47,7 @@ class Tolerances:
             self.grown = np.minimum(self.grown, self._growth(moved))
 
     def run(self, rtol: float, v: Floats) -> Trajectory:
-        return run(
-            self.scene, self.q, v, float(self.at[-1]), rtol=rtol, samples=self.at, max_steps=STEPS, ledger=False
-        )
+        return run(self.scene, self.q, v, float(self.at[-1]), rtol=rtol, samples=self.at, max_steps=STEPS, ledger=False)
 
     def places(self, motion: Trajectory) -> Floats:
         """Return q at the instants up to where a motion ends."""
@@ -77,9 +78,10 @@ class Tolerances:
         known, places = min(self.known, known_until(motion)), self.places(motion)
         count = min(len(places), len(self.truth))
         part = np.abs(places[:count] - self.truth[:count]).max(axis=1) / max(1.0, float(np.abs(self.truth).max()))
-        worst = float((part / self.grown[:count] / rtol)[self.at[:count] < known].max(initial=0.0))
+        finest = max(rtol, KNOWN_TO)
+        worst = float((part / self.grown[:count] / finest)[self.at[:count] < known].max(initial=0.0))
         ends = ended(motion), ended(self.fine)
         last = float(self.grown[count - 1])
-        if min(ends) < known and abs(ends[0] - ends[1]) > ALLOWED * rtol * last:
+        if min(ends) < known and abs(ends[0] - ends[1]) > ALLOWED * finest * last:
             worst = math.inf
         return worst, (rtol, worst, ends, motion.outcome, self.fine.outcome, known)
