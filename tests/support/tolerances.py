@@ -1,4 +1,4 @@
-"""By how much a motion depends on its tolerance, beyond what its start makes of it, before it says anything of itself."""
+"""By how much a motion depends on its tolerance, beyond what its start makes of it, before it says more of itself."""
 
 from __future__ import annotations
 
