@@ -31,7 +31,8 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     told.append(f"{truth.source}.")
     if many := truth.trajectory.counts.get("not_searched", 0):
         told.append(
-            f"At {many} instant{'s' * (many > 1)} too many contacts could change to search for a second motion."
+            f"At {many} instant{'s' * (many > 1)}, from {truth.trajectory.searched_until:.4g} s on, "
+            "too many contacts could change to search for a second motion."
         )
     if other:
         told.append(f"At {other} samples its two sources have rows in other modes.")
