@@ -66,7 +66,7 @@ def judged(
     `begin` is told what each metric is before it is measured, and returns why it is not to be; nothing if it is.
     """
     check_names(case)
-    truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
+    truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None], case))
     trusted = shortened(truth)
     rows = [row for entry in entries for row in verdicts(case, entry, trusted, command, begin)]
     return [

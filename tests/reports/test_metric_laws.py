@@ -37,7 +37,7 @@ NEAR = ("gap_error", "position")
 
 def test_the_clock_of_a_run_is_the_truths(one: Drawn) -> None:
     for releases in (False, True):
-        np.testing.assert_allclose(clock(one.truth, one.run, releases), one.t, atol=1e-9 * one.case.t_end)
+        np.testing.assert_allclose(clock(one.truth, one.run, one.case, releases), one.t, atol=1e-9 * one.case.t_end)
 
 
 OF_EQUATIONS = ("complementarity", "mode_residual", "mode_contradicted")
