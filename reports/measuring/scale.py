@@ -101,7 +101,10 @@ def scale_of_rates(exact: Trajectory, case: Case) -> Floats:
     """
     shared = of_like(np.max(np.abs(exact.v), axis=0, initial=0.0), case.velocities)
     rests, smallest = shared < RESTS, least(case.velocities, rates=True)
-    sizes = np.delete(scale_of(exact, case), [at + 3 for at in case.quaternions])
+    sizes = scale_of(exact, case)
+    for at in case.quaternions:
+        sizes[at : at + 4] = 1.0
+    sizes = np.delete(sizes, [at + 3 for at in case.quaternions])
     return np.maximum(np.maximum(shared, smallest), np.where(rests, sizes / case.t_end, 0.0))
 
 
