@@ -18,7 +18,7 @@ from crossbody.cases.case import Law
 from crossbody.reports.measuring.truth import Truth
 
 SAMPLES, CONTACTS = 30, 4
-HAIR, NEAR, NEARER = 1e-4, 1e-5, 1e-3
+HAIR, NEAR, NEARER = 1e-4, 1e-5, 1e-2
 """Part of their instants that samples are before events; of its errors that a run begins with that stays near; and of
 those of positions and velocities where touches are laid on the truth's."""
 SLOW = 1e-2
@@ -86,7 +86,7 @@ class MadeUp:
         }  # fmt: skip
         for name in ("q", "v") if self.case.law.touches.any() else ():  # by less than another clock makes of it
             right = getattr(exact, name)
-            changed[name] = right + NEARER * (changed[name] - right)
+            changed[name] = right + NEARER * (SLOW if name == "v" else 1.0) * (changed[name] - right)
         for at in self.case.quaternions:
             changed["q"][:, at : at + 4] /= np.linalg.norm(changed["q"][:, at : at + 4], axis=1, keepdims=True)
             changed["q"][:, at : at + 4] *= random.choice([-1.0, 1.0], (len(self.t), 1))

@@ -181,8 +181,9 @@ def _of_unit(signal: Floats, named: Sequence[Coordinate], least: Sequence[float]
 def velocities(plain: Plain) -> Iterator[Control]:
     """Put a velocity off at one sample; record all of them a tenth too large."""
     case, run = plain.case, plain.run
-    largest = _of_unit(run.v, case.velocities, [c.rate for c in case.velocities])
-    for j in plain.some(range(run.v.shape[1])):
+    largest, turns = _of_unit(run.v, case.velocities, [c.rate for c in case.velocities]), _turns(case)
+    largest = np.where(turns & (largest <= RESTS), np.maximum(largest, 1.0 / case.t_end), largest)
+    for j in plain.some(np.flatnonzero(largest > RESTS).tolist()):
         for i, sign in plain.both():
             yield Control(
                 fault=f"the velocity of {case.velocities[j].name} {sign * PART:g} of the largest off at one sample",
@@ -191,6 +192,14 @@ def velocities(plain: Plain) -> Iterator[Control]:
     for size in (TENTH, -TENTH) if np.ptp(run.q, axis=0).max() > RESTS else ():
         fast = replace(run, v=(1.0 + size) * run.v)
         yield Control(fault=f"velocities {size:g} too large", run=fast, sees={"rate_residual": roughly(TENTH)})
+
+
+def _turns(case: Case) -> NDArray[np.bool_]:
+    """Return which velocities (nv,) are those of bodies that turn in space: where they rest, a radian in the horizon."""
+    found = np.zeros(len(case.velocities), dtype=bool)
+    for i, at in enumerate(case.quaternions):
+        found[at - i : at - i + 3] = True
+    return found
 
 
 def starts(plain: Plain) -> Iterator[Control]:
