@@ -195,7 +195,7 @@ def velocities(plain: Plain) -> Iterator[Control]:
 
 
 def _turns(case: Case) -> NDArray[np.bool_]:
-    """Return which velocities (nv,) are those of bodies that turn in space: where they rest, a radian in the horizon."""
+    """Return which velocities (nv,) are of bodies that turn in space: if they rest, errors are by a radian."""
     found = np.zeros(len(case.velocities), dtype=bool)
     for i, at in enumerate(case.quaternions):
         found[at - i : at - i + 3] = True

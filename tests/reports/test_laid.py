@@ -1,0 +1,155 @@
+"""Touches are laid on the truth's where that brings motions nearer: never are they farther than at equal times."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crossbody import cases, engines
+from crossbody.cases import Case, Event, Mode, Tier, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.reports import metrics
+from crossbody.reports.judging.made_up import case_of
+from crossbody.reports.judging.parts import Study, splits
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring.alignment import clock, which_laid
+from crossbody.reports.measuring.laid import TOLD, _least, _path
+from crossbody.reports.measuring.scale import scale_of, scale_of_rates
+from crossbody.reports.measuring.truth import Truth, from_run
+
+G, T = 9.81, 1.0
+CASE = case_of(("m", "m", "rad"), (True,), 1)
+
+
+def motion(touches: Floats, t: Floats, speed: float, turn: float, rebound: float, start: float) -> Trajectory:
+    """A body thrown along a floor, which bounces at given instants, s, and turns: x, z and an angle."""
+    t = np.sort(np.concatenate([t, touches, touches]))
+    past = np.searchsorted(touches, t, side="left") + np.append(False, t[1:] == t[:-1])
+    since = t - np.append(0.0, touches)[past]
+    z, w = rebound * since - 0.5 * G * since**2, rebound - G * since
+    z, w = np.where(past > 0, z, start - 0.5 * G * since**2), np.where(past > 0, w, -G * since)
+    x, angle = speed * t, 0.5 * turn * t * t
+    events = [
+        Event(t=float(at), contact=0, before=a, after=b)
+        for at in touches for a, b in ((Mode.FREE, Mode.CONTACT), (Mode.CONTACT, Mode.FREE))
+    ]  # fmt: skip
+    none = np.zeros((len(t), 1))
+    return Trajectory(
+        t=t, q=np.column_stack([x, z, angle]), v=np.column_stack([0.0 * t + speed, w, turn * t]), gap=z[:, None],
+        lam=none, energy=np.zeros((len(t), 2)), mode=none.astype(np.int8), events=tuple(events),
+    )  # fmt: skip
+
+
+def thrown(draw: np.random.Generator) -> tuple[Truth, Trajectory]:
+    """A truth and a run that bounces at other instants, and is off by draws besides."""
+    touches = np.cumsum(draw.uniform(0.02, 0.4, draw.integers(1, 6)))
+    touches = np.append(10.0 ** draw.uniform(-9.0, -3.0), touches)[draw.integers(0, 2) :]
+    touches, speed = touches[touches < 0.9], draw.choice([0.1, 3.0, 100.0])
+    turn, rebound = draw.choice([0.0, 1e-9, 10.0]), draw.uniform(0.1, 2.0)
+    other = np.sort(np.abs(touches + 10.0 ** draw.uniform(-6.0, -2.0) * draw.uniform(-1.0, 3.0, len(touches))))
+    off = 1.0 + 10.0 ** draw.uniform(-7.0, -2.0, 3)
+    grid = np.linspace(0.0, T, 4001)
+    exact = motion(touches, grid, speed, turn, rebound, 0.5)
+    some = np.linspace(0.0, T, int(draw.choice([41, 301, 1001])))
+    run = motion(np.maximum(other, 1e-4), some, speed * off[0], turn * off[1], rebound * off[2], 0.5)
+    return from_run(exact, Tier.A, "thrown"), run
+
+
+def at_equal_times(name: str, truth: Truth, run: Trajectory, case: Case) -> float:
+    """What a metric says where no touch is matched."""
+    found = metrics.load(name).measure(truth, replace(run, events=()), case)
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_no_clock_brings_a_motion_farther_from_the_truth_than_time_itself(seed: int) -> None:
+    truth, run = thrown(np.random.default_rng(seed))
+    for name in ("position", "velocity"):
+        found = metrics.load(name).measure(truth, run, CASE)
+        assert found is not None
+        assert found <= max(at_equal_times(name, truth, run, CASE) * (1.0 + 1e-9), TOLD)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_copy_of_the_truth_that_bounces_late_is_off_by_nothing(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    truth, _ = thrown(draw)
+    exact = truth.trajectory
+    touches = np.array([e.t for e in exact.events if e.before == Mode.FREE])
+    late = 10.0 ** draw.uniform(-6.0, -3.0) * draw.uniform(-0.3, 1.0, len(touches)) * touches.min()
+    if len(touches) > 1:
+        late *= min(1.0, float(np.diff(touches).min()))
+
+    def shown(t: Floats) -> Floats:
+        return t + np.interp(t, np.append(0.0, touches), np.append(0.0, late))
+
+    events = tuple(replace(e, t=float(shown(np.array(e.t)))) for e in exact.events)
+    run = replace(exact, t=shown(exact.t), events=events)
+    for name in ("position", "velocity"):
+        found = metrics.load(name).measure(truth, run, CASE)
+        assert found is not None
+        assert found <= 2.0 * TOLD
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_way_through_arcs_is_the_least_of_all(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    costs = draw.uniform(size=(draw.integers(1, 8), 2, 2))
+    ways = [np.array([0, *(k >> i & 1 for i in range(len(costs) - 1)), 0]) for k in range(2 ** (len(costs) - 1))]
+    paid = [costs[np.arange(len(costs)), way[:-1], way[1:]] for way in ways]
+    for join, total in ((np.maximum, np.max), (np.add, np.sum)):
+        most, laid = _path(costs, join)
+        assert most == pytest.approx(min(total(one) for one in paid))
+        assert total(costs[np.arange(len(costs)), 1 - laid, np.append(1 - laid[1:], 0)]) == pytest.approx(most)
+    least = min(one.max() for one in paid)
+    told = [(one.sum(), way) for one, way in zip(paid, ways, strict=True) if one.max() <= least]
+    assert np.array_equal(_least(costs), min(told, key=lambda one: one[0])[1][:-1] == 0)
+
+
+PLANE = """<mujoco model="m"><option timestep="0.001"/><worldbody>
+<geom name="floor" type="plane" size="9 9 .1" euler="0 {tilt} 0" friction="{mu} 0 0"/>
+<body name="b" pos="{x} 0 {z}" euler="0 {tilt} 0"><freejoint name="free"/>
+<geom name="g" type="{shape}" size=".1 .1 .1" mass="1" friction="{mu} 0 0"/></body></worldbody>
+<keyframe><key name="k" qpos="{x} 0 {z} {w} 0 {y} 0" qvel="{v} 0 0 0 0 0"/></keyframe></mujoco>"""
+
+
+def placed(folder: Path, shape: str, tilt: float, mu: float, above: float, v: float = 0.0) -> Case:
+    """A body on, or a hair above, a plane."""
+    a, half = np.deg2rad(tilt), 0.5 * np.deg2rad(tilt)
+    x, z = np.sin(a) * (0.1 + above), np.cos(a) * (0.1 + above)
+    file = folder / "plane.xml"
+    file.write_text(
+        PLANE.format(shape=shape, tilt=tilt, mu=mu, x=f"{x:.17g}", z=f"{z:.17g}", v=v, w=np.cos(half), y=np.sin(half))
+    )
+    return cases.from_file(file, "k", t_end=T)
+
+
+@pytest.mark.parametrize(
+    ("shape", "tilt", "mu", "v"), [("box", 0.0, 0.2, 3.0), ("box", 20.0, 0.2, 0.0), ("sphere", 10.0, 0.8, 0.0)]
+)
+@pytest.mark.parametrize("above", [0.0, 1e-9, 4.5e-9, 1e-7])
+def test_a_body_that_starts_a_hair_above_a_plane_is_off_by_what_it_is_at_equal_times(
+    tmp_path: Path, shape: str, tilt: float, mu: float, v: float, above: float
+) -> None:
+    """A box that slides, with speed or down a slope, and a sphere that rolls: by their closed forms."""
+    case = placed(tmp_path, shape, tilt, mu, above, v)
+    truth, a = truth_of(case), np.deg2rad(tilt)
+    along = G * np.sin(a) / 1.4 if shape == "sphere" else G * (np.sin(a) - mu * np.cos(a))
+    way = np.array([np.cos(a), 0.0, -np.sin(a)])
+    for engine, profile, known in (("pinocchio", "admm", 2e-3), ("mujoco", "as_is", 3e-3)):
+        if engine not in engines.names() or engines.load(engine).why_not(case, profile) is not None:
+            continue
+        run = engines.load(engine).prepare(case, profile).run()
+        exact = np.outer(v * run.t + 0.5 * along * run.t**2, way)
+        off = np.max(np.abs(run.q[:, :3] - case.q0[:3] - exact))
+        sizes = scale_of(truth.trajectory, case)
+        found = metrics.load("position").measure(truth, run, case)
+        assert found is not None
+        turned = at_equal_times("position", truth, run, case)
+        assert found <= turned * (1.0 + 1e-6)
+        assert off / sizes[:3].max() * 0.5 <= turned
+        assert off <= known
