@@ -13,16 +13,19 @@ from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.made_up import case_of
-from crossbody.reports.measuring.laid import TOLD, _least, _path
-from crossbody.reports.measuring.scale import scale_of
+from crossbody.reports.judging.parts import Positions
+from crossbody.reports.measuring.alignment import clock, which_laid
+from crossbody.reports.measuring.laid import TOLD, Laid, _least, _path
+from crossbody.reports.measuring.scale import scale_of, scale_of_rates
 from crossbody.reports.measuring.truth import Truth, from_run
 
 G, T = 9.81, 1.0
-CASE = case_of(("m", "m", "rad"), (True,), 1)
+CASE = replace(case_of(("m", "m", "rad"), (True,), 1), t_end=T)
+GRID = np.linspace(0.0, T, 1001)
 
 
 def motion(touches: Floats, t: Floats, speed: float, turn: float, rebound: float) -> Trajectory:
-    """A body thrown along a floor, which bounces at instants, s, rebounds from the last, m/s, and turns: x, z, angle."""
+    """A body thrown along a floor, which bounces at instants, s, rebounds from the last, m/s, and turns."""
     t = np.sort(np.concatenate([t, touches, touches]))
     past = np.searchsorted(touches, t, side="left") + np.append(False, t[1:] == t[:-1])
     starts = np.append(-touches[0], touches)[past]
@@ -106,6 +109,45 @@ def test_the_way_through_arcs_is_the_least_of_all(seed: int) -> None:
     least = min(one.max() for one in paid)
     told = [(one.sum(), way) for one, way in zip(paid, ways, strict=True) if one.max() <= least]
     assert np.array_equal(_least(costs), min(told, key=lambda one: one[0])[1][:-1] == 0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_another_run_is_laid_on_the_touches_that_are_told_by_one(seed: int) -> None:
+    """Each touch as the nearest that is told of, and between them time goes straight."""
+    draw = np.random.default_rng(seed)
+    at = np.append(0.0, 0.1 * np.arange(1, 8) + draw.uniform(-0.02, 0.02, 7))
+    on = np.append(True, draw.random(7) < 0.5)
+    some = at + draw.uniform(-0.02, 0.02, 8)
+    assert np.array_equal(Laid(at=at, on=on).of(some), on)
+    assert Laid(at=at[:1], on=on[:1]).of(some).all()
+    truth, run = (
+        from_run(motion(at[1:], GRID, 1.0, 0.0, 1.0), Tier.A, "thrown"),
+        motion(at[1:] + 5e-3, GRID, 1.0, 0.0, 1.0),
+    )
+    shown = clock(truth, run, CASE, laid=Laid(at=at, on=on))
+    np.testing.assert_allclose(np.interp(at[1:] + 5e-3, run.t, shown), at[1:] + np.where(on[1:], 0.0, 5e-3), atol=1e-12)
+
+
+def test_parts_are_told_by_the_clock_of_the_judged_run() -> None:
+    """Of a slide that is judged at equal times, another run is too, though by itself its touch would be laid."""
+    truth = from_run(motion(np.array([1e-6]), GRID, 3.0, 0.0, 0.0), Tier.A, "slides")
+    judged = motion(np.array([4e-3]), GRID, 3.0 * (1.0 + 1e-5), 0.0, 0.0)
+    other = motion(np.array([2e-3]), GRID, 3.0, 0.0, 0.0)
+    late = replace(other, q=np.column_stack([3.0 * (other.t - 2e-3), other.q[:, 1:]]))
+    assert not which_laid(truth, judged, CASE).on[1]
+    assert which_laid(truth, late, CASE).on[1]
+    assert np.max(np.abs(Positions(CASE, truth, judged)(late))) == pytest.approx(2e-3, rel=0.1)
+
+
+def test_rates_of_what_does_not_turn_are_measured_by_a_radian_over_the_horizon(tmp_path: Path) -> None:
+    case = placed(tmp_path, "box", 0.0, 0.2, 0.0, 3.0)
+    exact = engines.load("reference").prepare(case, "compiled").run()
+    assert np.max(np.abs(exact.v[:, 3:])) < 1e-6
+    sizes = scale_of_rates(exact, case)
+    assert sizes[3:] == pytest.approx(1.0 / case.t_end)
+    assert sizes[:3] == pytest.approx(3.0)
+    slow = replace(exact, v=exact.v + np.array([0.0, 0.0, 0.0, 0.01, 0.0, 0.0]))
+    assert scale_of_rates(slow, case)[3:] == pytest.approx(0.01, rel=1e-3), "of what turns by its own"
 
 
 PLANE = """<mujoco model="m"><option timestep="0.001"/><worldbody>
