@@ -143,13 +143,25 @@ def aligned(
     return inside, exact
 
 
+def expect(truth: Truth, runs: Sequence[Trajectory], case: Case) -> None:
+    """Have a truth found at once for all runs that are laid beside it.
+
+    Which touches are laid is told by the truth where all are: for that it is asked first.
+    """
+    truth.expect([_inside(truth, clock(truth, run, None)) for run in runs])
+    truth.expect(instants(truth, runs, case))
+
+
 def instants(truth: Truth, runs: Iterable[Trajectory], case: Case) -> Iterator[Floats]:
     """Yield the instants at which the truth is asked for where runs are laid beside it."""
     for run in runs:
         for releases in (False, True):
-            t = clock(truth, run, case, releases)
-            known = t[_known(truth, t)]
+            known = _inside(truth, clock(truth, run, case, releases))
             yield from (known, _sides(truth, run, known))
+
+
+def _inside(truth: Truth, t: Floats) -> Floats:
+    return t[_known(truth, t)]
 
 
 def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:

@@ -4,15 +4,16 @@ An impact that comes late by dt leaves twice the speed of the rebound times dt b
 but for that: the clock of the run is stretched until it stands at the truth's. But all else that moves is off then by
 its own speed times dt. Of a box that slides, and comes upon its floor a nanometre below in the first step of an engine
 and in the first microseconds of the truth, that is all that it is off by. So at every touch a clock either stands at
-the truth's or goes as time does, and from one to the next it is straight. Of all these clocks that one is taken whose
-largest error is least, of positions over the largest at equal times, or of velocities over theirs; and of those the
-one whose arcs are nearest together. As time itself is one of them, no clock brings either farther from the truth.
+the truth's or goes as time does, and from one to the next it is straight. Clocks by which positions or velocities are
+anywhere farther from the truth than they are somewhere at equal times are none; time itself is always one. Of the
+others that one is taken whose largest error is least, as a part of that at equal times, positions and velocities
+together; and of those the one whose arcs are nearest in sum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ from crossbody.reports.measuring.truth import Truth, dense, taken
 ROUNDING = 1e-12
 """Part of the horizon by which two instants differ that are one but for rounding."""
 TOLD = 1e-9
-"""Errors below this part of what they are measured by are what splines of a truth leave: touches are laid there."""
+"""Errors below this part of what they are measured by are what runs at the tolerance of limits are off by anyhow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +73,8 @@ def nearest(truth: Truth, run: Trajectory, case: Case, here: Floats, there: Floa
         largest = _largest(truth, run, case, here, there)
         plain = np.maximum(largest[:, 1, 1].max(axis=0), TOLD)
         if np.isfinite(plain).all():
-            laid = _least(np.max(np.maximum(largest, TOLD) / plain, axis=3))
+            parts = np.maximum(largest, TOLD) / plain
+            laid = _least(np.where((parts > 1.0).any(axis=3), np.inf, parts.sum(axis=3)))
     return Laid(at=there, on=laid)
 
 
@@ -89,11 +91,20 @@ def _largest(truth: Truth, run: Trajectory, case: Case, here: Floats, there: Flo
     }  # fmt: skip
     shown = {way: _shown(run.t, arcs, here, *ends) for way, ends in ways.items()}
     known = np.max(list(shown.values()), axis=0) <= min(float(truth.trajectory.t[-1]), truth.trusted)
-    at, run = dense(truth.trajectory), taken(run, known)
+    exact, run = truth.at(straight(run.t, here, there)[known]), taken(run, known)
+    near = {way: dense(truth.trajectory)(t[known]) for way, t in shown.items()}
     for way, (left, right) in ways.items():
-        found[:, *way] = _errors(truth, run, at(shown[way][known]), case, here)
+        found[:, *way] = _errors(truth, run, _moved(exact, near[0, 0], near[way]), case, here)
         found[left >= right, *way] = np.inf
     return found
+
+
+def _moved(exact: Trajectory, here: Trajectory, there: Trajectory) -> Trajectory:
+    """Return a truth at other instants than those at which it was asked for, by how it moves between: n samples.
+
+    What splines of it are off by is the same at both, but for as much of it as they are apart.
+    """
+    return replace(there, q=exact.q + (there.q - here.q), v=exact.v + (there.v - here.v))
 
 
 def _shown(t: Floats, arcs: NDArray[np.intp], here: Floats, left: Floats, right: Floats) -> Floats:
