@@ -26,6 +26,9 @@ from crossbody.reports.measuring.impulse import away
 from crossbody.reports.measuring.scale import scale_of, scale_of_rates
 from crossbody.reports.measuring.truth import Truth, dense, taken
 
+APART = 0.5
+"""Part of what velocities are measured by from which on an error says that a sample is on the other side of an impact:
+one that is larger is no farther."""
 ROUNDING = 1e-12
 """Part of the horizon by which two instants differ that are one but for rounding."""
 TOLD = 1e-9
@@ -130,7 +133,7 @@ def _errors(truth: Truth, run: Trajectory, exact: Trajectory, case: Case, here: 
     np.maximum.at(found[:, 0], pieces(here, t), worst)
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     rates = np.abs(run.v - exact.v)[smooth] / scale_of_rates(truth.trajectory, case)
-    np.maximum.at(found[:, 1], pieces(here, run.t)[smooth], np.max(rates, axis=1, initial=0.0))
+    np.maximum.at(found[:, 1], pieces(here, run.t)[smooth], np.minimum(np.max(rates, axis=1, initial=0.0), APART))
     return found
 
 
