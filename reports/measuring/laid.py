@@ -6,8 +6,8 @@ its own speed times dt. Of a box that slides, and comes upon its floor a nanomet
 and in the first microseconds of the truth, that is all that it is off by. So at every touch a clock either stands at
 the truth's or goes as time does, and from one to the next it is straight. Clocks by which positions or velocities are
 anywhere farther from the truth than they are somewhere at equal times are none; time itself is always one. Of the
-others that one is taken whose largest error is least, as a part of that at equal times, positions and velocities
-together; and of those the one whose arcs are nearest in sum.
+others that one is taken whose largest errors of both, as parts of those at equal times, are least in sum; and of those
+the one whose arcs are nearest in sum.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ from crossbody.reports.measuring.truth import Truth, dense, taken
 APART = 0.5
 """Part of what velocities are measured by from which on an error says that a sample is on the other side of an impact:
 one that is larger is no farther."""
+BOUNDS = 25
+"""So many bounds on errors of positions are tried, at most, for how small those of velocities can be below them."""
 ROUNDING = 1e-12
 """Part of the horizon by which two instants differ that are one but for rounding."""
 TOLD = 1e-9
@@ -76,8 +78,7 @@ def nearest(truth: Truth, run: Trajectory, case: Case, here: Floats, there: Floa
         largest = _largest(truth, run, case, here, there)
         plain = np.maximum(largest[:, 1, 1].max(axis=0), TOLD)
         if np.isfinite(plain).all():
-            parts = np.maximum(largest, TOLD) / plain
-            laid = _least(np.where((parts > 1.0).any(axis=3), np.inf, parts.sum(axis=3)))
+            laid = _least(np.maximum(largest, TOLD) / plain)
     return Laid(at=there, on=laid)
 
 
@@ -137,11 +138,23 @@ def _errors(truth: Truth, run: Trajectory, exact: Trajectory, case: Case, here: 
     return found
 
 
-def _least(costs: Floats) -> NDArray[np.bool_]:
-    """Return which touches (k,) are laid where the largest cost of arcs (k, 2, 2) is least, and then their sum."""
-    most, _ = _path(costs, np.maximum)
-    _, laid = _path(np.where(costs <= most, costs, np.inf), np.add)
-    return laid
+def _least(parts: Floats) -> NDArray[np.bool_]:
+    """Return which touches (k,) are laid where the largest errors of both kinds are least together, then their sum.
+
+    Args:
+        parts: errors of positions and velocities on arcs (k, 2, 2, 2), as parts of the largest at equal times, than
+            which none may be larger.
+    """
+    ways = np.where((parts > 1.0).any(axis=3, keepdims=True), np.inf, parts)
+    most, _ = _path(ways[..., 0], np.maximum)
+    bounds = np.unique(ways[..., 0][(ways[..., 0] >= most) & (ways[..., 0] <= 1.0)])
+    told = []
+    for bound in bounds[np.linspace(0, len(bounds) - 1, min(len(bounds), BOUNDS)).astype(np.intp)]:
+        fast, _ = _path(np.where(ways[..., 0] <= bound, ways[..., 1], np.inf), np.maximum)
+        told.append((bound + fast, bound, fast))
+    _, bound, fast = min(told)
+    near = (ways[..., 0] <= bound) & (ways[..., 1] <= fast)
+    return _path(np.where(near, ways.sum(axis=3), np.inf), np.add)[1]
 
 
 def _path(costs: Floats, join: Callable[[Floats, Floats], Floats]) -> tuple[float, NDArray[np.bool_]]:

@@ -107,9 +107,22 @@ def test_the_way_through_arcs_is_the_least_of_all(seed: int) -> None:
         most, laid = _path(costs, join)
         assert most == pytest.approx(min(total(one) for one in paid))
         assert total(costs[np.arange(len(costs)), 1 - laid, np.append(1 - laid[1:], 0)]) == pytest.approx(most)
-    least = min(one.max() for one in paid)
-    told = [(one.sum(), way) for one, way in zip(paid, ways, strict=True) if one.max() <= least]
-    assert np.array_equal(_least(costs), min(told, key=lambda one: one[0])[1][:-1] == 0)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_largest_errors_of_both_kinds_are_least_together_and_none_is_larger_than_at_equal_times(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    parts = draw.uniform(0.0, 1.3, size=(draw.integers(1, 6), 2, 2, 2))
+    parts[:, 1, 1] /= parts[:, 1, 1].max(axis=0)
+    ways = [np.array([0, *(k >> i & 1 for i in range(len(parts) - 1)), 0]) for k in range(2 ** (len(parts) - 1))]
+    paid = {tuple(way[:-1] == 0): parts[np.arange(len(parts)), way[:-1], way[1:]] for way in ways}
+    allowed = {laid: one for laid, one in paid.items() if (one <= 1.0).all()}
+    if not allowed:
+        return
+    worst = {laid: one.max(axis=0).sum() for laid, one in allowed.items()}
+    found = tuple(_least(parts).tolist())
+    assert found in allowed
+    assert worst[found] == pytest.approx(min(worst.values()))
 
 
 @pytest.mark.parametrize("seed", range(20))
