@@ -95,17 +95,17 @@ def _of_joints(own: Floats, case: Case, scene: Scene) -> Floats:
 def scale_of_rates(exact: Trajectory, case: Case) -> Floats:
     """Return what velocities are measured by (nv,): the largest |v| of all that share a unit.
 
-    Where all of these rest, 1e-9 rad/s of a box that slides without turning say nothing of how far another rate is
-    off. What matters of it is where it leads: it is measured by the rate that brings a coordinate as far as its
-    position is measured by, over the horizon. A rotation is measured by a radian.
+    Where all of these rest, and the case names no larger rate, 1e-9 rad/s of a box that slides without turning say
+    nothing of how far another rate is off. What matters of that is where it leads: it is measured by the rate that
+    brings a coordinate as far as its position is measured by, over the horizon. A rotation is measured by a radian.
     """
     shared = of_like(np.max(np.abs(exact.v), axis=0, initial=0.0), case.velocities)
-    rests, smallest = shared < RESTS, least(case.velocities, rates=True)
+    known = np.maximum(shared, least(case.velocities, rates=True))
     sizes = scale_of(exact, case)
     for at in case.quaternions:
         sizes[at : at + 4] = 1.0
     sizes = np.delete(sizes, [at + 3 for at in case.quaternions])
-    return np.maximum(np.maximum(shared, smallest), np.where(rests, sizes / case.t_end, 0.0))
+    return np.where(known > RESTS, known, np.maximum(known, sizes / case.t_end))
 
 
 def rounded(q: Floats) -> float:
