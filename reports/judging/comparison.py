@@ -17,7 +17,7 @@ from crossbody.reports.judging.stored import judged_alike
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.truth_row import of_truth, truth_row
 from crossbody.reports.judging.verdict import COLUMNS, Verdict, limit_for
-from crossbody.reports.measuring.alignment import instants
+from crossbody.reports.measuring.alignment import expect
 from crossbody.reports.measuring.truth import Truth, shortened
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def judged(
     `begin` is told what each metric is before it is measured, and returns why it is not to be; nothing if it is.
     """
     check_names(case)
-    truth.expect(instants(truth, [entry.run for entry in entries if entry.run is not None]))
+    expect(truth, [entry.run for entry in entries if entry.run is not None], case)
     trusted = shortened(truth)
     rows = [row for entry in entries for row in verdicts(case, entry, trusted, command, begin)]
     return [

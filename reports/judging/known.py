@@ -24,9 +24,9 @@ from crossbody.reports.sources import SHOWN, code
 
 Found = tuple[str, float, tuple[float, float], str]
 KINDS = (
-    "judging.known_answers", "judging.known_sides", "judging.known_sources", "judging.known_growth",
-    "judging.known_parts", "judging.known_steps", "judging.known_tables", "judging.known_equations",
-    "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
+    "judging.known_answers", "judging.known_sides", "judging.known_touches", "judging.known_sources",
+    "judging.known_growth", "judging.known_parts", "judging.known_steps", "judging.known_tables",
+    "judging.known_equations", "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
     "judging.known_verdicts", "judging.known_audits",
 )  # fmt: skip
 OF_FILES = ("judging.known_files",)

@@ -84,7 +84,8 @@ def _coordinates(made: MadeUp) -> Answers:
     """Positions by their own, velocities by their like; the way that velocities do not explain."""
     k, run, exact, case = made.trusted, made.run, made.exact, made.case
     own = np.abs(exact.q).max(axis=0)
-    fast = largest_of_like(np.abs(exact.v).max(axis=0), [c.unit for c in case.velocities])
+    rates = np.maximum(np.abs(exact.v).max(axis=0), [c.rate for c in case.velocities])
+    fast = largest_of_like(rates, [c.unit for c in case.velocities])
     found: dict[str, float | None] = {"velocity": float((np.abs(run.v[:k] - exact.v[:k]) / fast).max())}
     if case.scene is None and not case.quaternions:
         found["position"] = float((_at_and_between(run, exact, k, case.t_end / 200.0) / own).max())

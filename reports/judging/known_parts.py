@@ -21,6 +21,8 @@ from crossbody.reports.judging.planted import Range
 from crossbody.reports.measuring.truth import Truth
 
 SEED, ORDER, STEPS = 5, 1.5, (0.4, 0.2, 0.1)
+NEAR = 1e-3
+"""Part of its size by which a coordinate is off: less than by what another clock makes of it."""
 SAME = 1e-9
 """Part of the largest that rounding changes of any."""
 Found = tuple[str, float, Range, str]
@@ -58,12 +60,12 @@ def _drawn(made: MadeUp) -> Errors:
     size = draw.uniform(0.2, 0.8, (len(made.t), 1))
     size[len(made.t) // 3] = 1.0
     first = np.arange(n)
-    step = np.where(first == n - 1, 0.2, -0.02 * (1.0 + first)) / STEPS[-1] ** ORDER
-    model = np.where(first == n - 1, 0.05, np.where(first == 1, -0.12, 0.01))
+    step = NEAR * np.where(first == n - 1, 0.2, -0.02 * (1.0 + first)) / STEPS[-1] ** ORDER
+    model = NEAR * np.where(first == n - 1, 0.05, np.where(first == 1, -0.12, 0.01))
     shortest = float(np.min(np.diff(made.knots)))
     late, later = 0.04 * shortest * np.where(touches == 1, -1.0, 0.5), 0.1 * shortest * (touches == 1)
     later = np.where(touches == 1, -later, 0.01 * shortest) / STEPS[-1] ** ORDER
-    return Errors(a=model, b=step, c=np.where(first == n - 1, 0.03, 0.06), late=late, later=later, size=size)
+    return Errors(a=model, b=step, c=NEAR * np.where(first == n - 1, 0.03, 0.06), late=late, later=later, size=size)
 
 
 def _run(made: MadeUp, errors: Errors, by: float, read: float = 0.0, model: float = 1.0) -> Trajectory:

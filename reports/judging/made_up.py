@@ -18,8 +18,11 @@ from crossbody.cases.case import Law
 from crossbody.reports.measuring.truth import Truth
 
 SAMPLES, CONTACTS = 30, 4
-HAIR, NEAR = 1e-4, 1e-5
-"""Part of their instants that samples are before events; and of its errors that a run begins with that stays near."""
+HAIR, NEAR, NEARER = 1e-4, 1e-5, 1e-2
+"""Part of their instants that samples are before events; of its errors that a run begins with that stays near; and of
+those of positions and velocities where touches are laid on the truth's."""
+SLOW = 1e-2
+"""Part of the size of positions that velocities have: they are not their rates, and lead nowhere between samples."""
 NAMES = ("q", "v", "gap", "lam", "energy")
 
 
@@ -81,6 +84,9 @@ class MadeUp:
             name: right + random.uniform(0.01, 0.2) * random.normal(size=right.shape)
             for name in NAMES for right in (getattr(exact, name),)
         }  # fmt: skip
+        for name in ("q", "v") if self.case.law.touches.any() else ():  # by less than another clock makes of it
+            right = getattr(exact, name)
+            changed[name] = right + NEARER * (SLOW if name == "v" else 1.0) * (changed[name] - right)
         for at in self.case.quaternions:
             changed["q"][:, at : at + 4] /= np.linalg.norm(changed["q"][:, at : at + 4], axis=1, keepdims=True)
             changed["q"][:, at : at + 4] *= random.choice([-1.0, 1.0], (len(self.t), 1))
@@ -104,6 +110,7 @@ class MadeUp:
         rows = len(case.law.a0)
         shapes = dict(zip(NAMES, (len(case.coordinates), len(case.velocities), rows, rows, 2), strict=True))
         made = {name: self._waves(t, width) for name, width in shapes.items()}
+        made["v"] *= SLOW
         for at in case.quaternions:
             made["q"][:, at : at + 4] /= np.linalg.norm(made["q"][:, at : at + 4], axis=1, keepdims=True)
         made["gap"] = made["q"] if self.scalar else self._apart(made["gap"])

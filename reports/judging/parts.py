@@ -30,10 +30,10 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.rotations import turned
-from crossbody.reports.measuring.alignment import clock, matched
+from crossbody.reports.measuring.alignment import clock, matched, which_laid
 from crossbody.reports.measuring.apart import LOOKS, far_apart, rate_of_error
+from crossbody.reports.measuring.scale import scale_of
 from crossbody.reports.measuring.truth import Truth, taken
-from crossbody.reports.metrics.position import scale_of
 
 PARTS = ("importer", "model", "step")
 SPLIT = ("position", "event_times")  # metrics whose error is split
@@ -264,7 +264,7 @@ class Positions:
         self.scale = scale_of(truth.trajectory, case)
         for at in case.quaternions:
             self.scale[at : at + 4] = 1.0  # rad
-        t, end = clock(truth, run), min(float(truth.trajectory.t[-1]), truth.trusted, until)
+        t, end = self._clock(truth, run), min(float(truth.trajectory.t[-1]), truth.trusted, until)
         inside = np.flatnonzero(t <= end)
         error = self._error(run.q[inside], truth.at(t[inside]).q) if len(inside) else np.zeros((0, 0))
         kept = distinct(np.linspace(0, max(len(inside) - 1, 0), min(len(inside), SAMPLES)).astype(np.intp))
@@ -275,6 +275,13 @@ class Positions:
         between = self._between(t)
         self.t = np.concatenate([t[self.samples], between])
         self.whole = np.concatenate([error[kept], self._lay(run, truth, between)]) if len(between) else error[kept]
+
+    def _clock(self, truth: Truth, run: Trajectory) -> Floats:
+        """Return the clock (n,) of a run, s, laid on the touches on which that of the judged one is.
+
+        Else parts would tell by how much clocks are apart.
+        """
+        return clock(truth, run, self.case, laid=which_laid(self.truth, self.run, self.case))
 
     def _between(self, t: Floats) -> Floats:
         """Return the instants (m,) inside of long steps of the judged run, by a clock (n,) that its samples have."""
@@ -293,7 +300,7 @@ class Positions:
     def expect(self, runs: Sequence[Trajectory]) -> None:
         """Have the truth found at once for all runs that will be laid on it."""
         if self.whole.size:
-            clocks = (clock(self.truth, run) for run in runs if len(run.t))
+            clocks = (self._clock(self.truth, run) for run in runs if len(run.t))
             self.truth.expect(_asked(t, distinct(_around(t, self.t)), self.truth) for t in clocks)
 
     def _lay(self, run: Trajectory, truth: Truth, instants: Floats) -> Floats:
@@ -302,7 +309,7 @@ class Positions:
         Between its samples the error is interpolated, which is smaller and smoother than the motion: by a
         cubic through the rates of both.
         """
-        t = clock(truth, run)
+        t = self._clock(truth, run)
         if not len(t) or t[-1] < instants.max() - REACHED * self.case.t_end:
             raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
         before, behind = around = _around(t, instants)
@@ -323,7 +330,7 @@ class Positions:
 
     def against(self, own: Truth) -> Floats:
         """Return the error of the judged run against another truth, on its clock."""
-        t = clock(own, self.run)
+        t = self._clock(own, self.run)
         exact = own.at(np.minimum(t[self.samples], float(own.trajectory.t[-1])))
         error, between = self._error(self.run.q[self.samples], exact.q), self._between(t)
         return np.concatenate([error, self._lay(self.run, own, between)]) if len(between) else error

@@ -182,15 +182,29 @@ def velocities(plain: Plain) -> Iterator[Control]:
     """Put a velocity off at one sample; record all of them a tenth too large."""
     case, run = plain.case, plain.run
     largest = _of_unit(run.v, case.velocities, [c.rate for c in case.velocities])
+    leads, turns = _of_unit(run.q, case.coordinates, [c.size for c in case.coordinates]) / case.t_end, _turns(case)
+    leads = np.where(turns, 1.0 / case.t_end, np.delete(leads, [at + 3 for at in case.quaternions]))
+    rests = largest <= RESTS
+    sizes, least = np.where(rests, np.maximum(largest, leads), largest), np.where(rests & ~turns, largest, np.inf)
     for j in plain.some(range(run.v.shape[1])):
+        most = float(sizes[j] / min(least[j], sizes[j]))
         for i, sign in plain.both():
             yield Control(
                 fault=f"the velocity of {case.velocities[j].name} {sign * PART:g} of the largest off at one sample",
-                run=plain.off("v", (i, j), sign * PART * float(largest[j])), sees={"velocity": exactly(PART)},
+                run=plain.off("v", (i, j), sign * PART * float(sizes[j])),
+                sees={"velocity": ((1.0 - SLACK) * PART, (1.0 + SLACK) * PART * most)},
             )  # fmt: skip
     for size in (TENTH, -TENTH) if np.ptp(run.q, axis=0).max() > RESTS else ():
         fast = replace(run, v=(1.0 + size) * run.v)
         yield Control(fault=f"velocities {size:g} too large", run=fast, sees={"rate_residual": roughly(TENTH)})
+
+
+def _turns(case: Case) -> NDArray[np.bool_]:
+    """Return which velocities (nv,) are of bodies that turn in space: if they rest, errors are by a radian."""
+    found = np.zeros(len(case.velocities), dtype=bool)
+    for i, at in enumerate(case.quaternions):
+        found[at - i : at - i + 3] = True
+    return found
 
 
 def starts(plain: Plain) -> Iterator[Control]:

@@ -362,7 +362,7 @@ def _apart(truth: Truth, second: Trajectory, case: Case) -> tuple[Floats, Floats
     """Instants of the second run up to the end of the first (n,), and their distance over the largest coordinate."""
     from crossbody.reports.measuring.alignment import aligned
 
-    inside, exact = aligned(truth, second)
+    inside, exact = aligned(truth, second, case)
     scale = max(float(np.max(np.abs(truth.trajectory.q), initial=0.0)), RESTS)
     off = differences(second.q[inside], exact.q, case.quaternions)
     return second.t[inside], np.max(off, axis=1, initial=0.0) / scale
@@ -440,7 +440,7 @@ def _other_modes(truth: Truth, second: Trajectory, case: Case) -> float:
     """
     from crossbody.reports.measuring.alignment import aligned
 
-    inside, exact = aligned(truth, second)
+    inside, exact = aligned(truth, second, case)
     t, mode = second.t[inside], second.mode[inside]
     flat = np.abs(exact.gap) <= PARTED * float(np.max(np.abs(exact.gap), initial=0.0))
     told = ~flat | np.isin(exact.mode, CLOSED) | np.isin(mode, CLOSED)

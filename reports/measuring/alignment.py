@@ -2,7 +2,8 @@
 
 A shift of an impact by 2 ms costs 2 v0 in a raw difference of velocities although nothing else is
 wrong. So the run's clock is stretched, linearly between matched touches, until they stand at the
-truth's instants; how far they were off is a number of its own (metric event_times).
+truth's instants, wherever that brings the motions nearer (`measuring.laid`); how far they were off is a
+number of its own (metric event_times).
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from crossbody.cases import Case
 from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import Contact
 from crossbody.cases.defaults import shortest
 from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Mode, Trajectory
+from crossbody.reports.measuring.laid import Laid, nearest, straight
 
 if TYPE_CHECKING:
     from crossbody.reports.measuring.truth import Truth
@@ -79,11 +82,17 @@ def kinks(run: Trajectory) -> list[tuple[float, int, int]]:
     return sorted((s.t, s.variable, s.after) for s in run.switches if s.smooth)
 
 
-def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
-    """The truth's time of every sample of the run (n,), s.
+def clock(truth: Truth, run: Trajectory, case: Case | None, releases: bool = False, laid: Laid | None = None) -> Floats:
+    """Return the truth's time of every sample of a run (n,), s.
 
-    Where lam jumps besides, at `releases`, between stick and slip and at `kinks`, is laid on the truth's too
-    if it is asked for.
+    Args:
+        truth: what the run is laid beside.
+        run: with samples.
+        case: by which errors are measured, so that only touches are laid on the truth's which bring the motions
+            nearer (`measuring.laid`); without one all are.
+        releases: whether all touches are laid, and where lam jumps besides: at releases, between stick and slip, and
+            at `kinks`. What jumps is told by the side on which a sample stands, however short the time between.
+        laid: which touches are, if another run of the same engine tells it.
     """
     start, pairs = float(truth.trajectory.t[0]), matched(truth, run)
     knots = [(b.touch, a.touch) for a, b in pairs]
@@ -94,9 +103,19 @@ def clock(truth: Truth, run: Trajectory, releases: bool = False) -> Floats:
             if [one[1:] for one in mine] == [one[1:] for one in theirs]:
                 knots += [(b[0], a[0]) for a, b in zip(theirs, mine, strict=True)]
     here, there = _rising(start, knots)
-    late = np.maximum(run.t - here[-1], 0.0)
-    mapped: Floats = np.interp(run.t, here, there) + late
-    return mapped
+    if not releases and case is not None:
+        on = (which_laid(truth, run, case) if laid is None else laid).of(there)
+        there = np.where(on, there, here)
+        rises = np.append(True, np.diff(there) > 0.0)
+        here, there = here[rises], there[rises]
+    return straight(run.t, here, there)
+
+
+@remembered(16)
+def which_laid(truth: Truth, run: Trajectory, case: Case) -> Laid:
+    """Return which touches of a run are laid on the truth's where motions are compared: those that bring it nearer."""
+    here, there = _rising(float(truth.trajectory.t[0]), [(b.touch, a.touch) for a, b in matched(truth, run)])
+    return nearest(truth, run, case, here, there)
 
 
 def _rising(start: float, knots: Iterable[tuple[float, float]]) -> tuple[Floats, Floats]:
@@ -111,9 +130,11 @@ def _rising(start: float, knots: Iterable[tuple[float, float]]) -> tuple[Floats,
 
 
 @remembered(4)
-def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDArray[np.bool_], Trajectory]:
+def aligned(
+    truth: Truth, run: Trajectory, case: Case | None, releases: bool = False
+) -> tuple[NDArray[np.bool_], Trajectory]:
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
-    t = clock(truth, run, releases)
+    t = clock(truth, run, case, releases)
     inside = _known(truth, t)
     exact, sides = truth.at(t[inside]), _sides(truth, run, t[inside])
     if not np.array_equal(sides, exact.t):
@@ -122,13 +143,25 @@ def aligned(truth: Truth, run: Trajectory, releases: bool = False) -> tuple[NDAr
     return inside, exact
 
 
-def instants(truth: Truth, runs: Iterable[Trajectory]) -> Iterator[Floats]:
+def expect(truth: Truth, runs: Sequence[Trajectory], case: Case) -> None:
+    """Have a truth found at once for all runs that are laid beside it.
+
+    Which touches are laid is told by the truth where all are: for that it is asked first.
+    """
+    truth.expect([_inside(truth, clock(truth, run, None)) for run in runs])
+    truth.expect(instants(truth, runs, case))
+
+
+def instants(truth: Truth, runs: Iterable[Trajectory], case: Case) -> Iterator[Floats]:
     """Yield the instants at which the truth is asked for where runs are laid beside it."""
     for run in runs:
         for releases in (False, True):
-            t = clock(truth, run, releases)
-            known = t[_known(truth, t)]
+            known = _inside(truth, clock(truth, run, case, releases))
             yield from (known, _sides(truth, run, known))
+
+
+def _inside(truth: Truth, t: Floats) -> Floats:
+    return t[_known(truth, t)]
 
 
 def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:

@@ -8,10 +8,8 @@ import numpy as np
 
 from crossbody.cases import Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.between import between
 from crossbody.cases.defaults import shortest
-from crossbody.cases.remembered import remembered
-from crossbody.reports.measuring.truth import Truth, taken
+from crossbody.reports.measuring.truth import Truth, dense, taken
 
 BEFORE = 0.5 ** np.arange(24.0)
 """Instants before an event of the truth, as parts of how far the run's is off: also short slides lie between two."""
@@ -39,11 +37,6 @@ def off(truth: Truth, expected: float, found: float, guard: Callable[[Trajectory
         there = guard(taken(truth.trajectory, np.array([first])))
         if not abs(float(there[0])) <= truth.grows * known:
             return late
-    near = _dense(truth.trajectory)(np.maximum(expected - late * BEFORE, truth.trajectory.t[0]))
+    near = dense(truth.trajectory)(np.maximum(expected - late * BEFORE, truth.trajectory.t[0]))
     part = float(np.max(np.abs(guard(near)))) / known if known > 0.0 else np.inf
     return min(short * part, late) if part <= truth.grows else late
-
-
-@remembered(4)
-def _dense(run: Trajectory) -> Callable[[Floats], Trajectory]:
-    return between(run)

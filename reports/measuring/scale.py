@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crossbody.cases import Coordinate, Trajectory
+from crossbody.cases import Case, Coordinate, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.cases.scene import WIDTHS, Scene
 
 RESTS = 1e-4
 """Coordinates of one unit that all stay below this, in SI, rest: what is left of their motion is known to
@@ -19,6 +20,8 @@ IDLE = 1e-3
 """Part of the forces that move a mechanism below which its rows carry nothing but noise."""
 STILL = 1e-9
 """Part of a coordinate, or of a metre or radian, that is rounding and what tolerances leave, not motion."""
+SMALL = 1e-6
+"""Least that a coordinate of which others like it move is measured by, m or rad."""
 KNOWN = 1e-8
 """Part of an energy that must move to measure what it is off by: rounding of the rest is 1e-7 of it."""
 
@@ -54,6 +57,55 @@ def least(named: Sequence[Coordinate], rates: bool = False) -> Floats:
     """What coordinates, or their rates, are measured by at least (n,), SI."""
     known = [coordinate.rate if rates else coordinate.size for coordinate in named]
     return np.maximum(of_like(np.array(known), named), RESTS)
+
+
+def scale_of(exact: Trajectory, case: Case) -> Floats:
+    """Return what positions are measured by (nq,): the largest |q| of each; of its like, for one that rests.
+
+    The joints of a scene, a robot's, are measured by the largest of their unit: one that hardly
+    moves in the truth, by the balance of others, tells of an engine that moves it how far that
+    is, and not how still it ought to be. But not by where bodies float, nor by more than a
+    radian, what other rotations are measured by: a robot far from the origin, or the turns of a
+    wheel, would hide what a finger does. Of what floats, each body is measured by where it is
+    itself. Where all of these rest, what the case says of their size. Errors below 1e-12, what
+    absolute tolerances are, pass the usual limit of 1e-6.
+    """
+    own: Floats = np.max(np.abs(exact.q), axis=0)
+    smallest = least(case.coordinates)
+    shared = of_like(own, case.coordinates)
+    if case.scene is not None:
+        own = shared = _of_joints(own, case, case.scene)
+    scale = np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
+    scale[list(case.quaternions)] = 1.0  # rad
+    return scale
+
+
+def _of_joints(own: Floats, case: Case, scene: Scene) -> Floats:
+    """Return what each coordinate (nq,) of a scene is measured by: its own largest, or that of the joints like it."""
+    widths = [WIDTHS[joint.type][0] for joint in scene.joints]
+    floats = np.repeat([joint.type == "free" for joint in scene.joints], widths)
+    turns = np.array([coordinate.unit == "rad" for coordinate in case.coordinates])
+    joints = of_like(np.where(floats, 0.0, own), case.coordinates)
+    shared = np.where(turns, np.minimum(joints, 1.0), joints)
+    for at in np.cumsum([0, *widths[:-1]])[[joint.type == "free" for joint in scene.joints]]:
+        shared[at : at + 3] = own[at : at + 3].max()
+    return np.maximum(own, shared)
+
+
+def scale_of_rates(exact: Trajectory, case: Case) -> Floats:
+    """Return what velocities are measured by (nv,): the largest |v| of all that share a unit.
+
+    Where all of these rest, and the case names no larger rate, 1e-9 rad/s of a box that slides without turning say
+    nothing of how far another rate is off. What matters of that is where it leads: it is measured by the rate that
+    brings a coordinate as far as its position is measured by, over the horizon. A rotation is measured by a radian.
+    """
+    shared = of_like(np.max(np.abs(exact.v), axis=0, initial=0.0), case.velocities)
+    known = np.maximum(shared, least(case.velocities, rates=True))
+    sizes = scale_of(exact, case)
+    for at in case.quaternions:
+        sizes[at : at + 4] = 1.0
+    sizes = np.delete(sizes, [at + 3 for at in case.quaternions])
+    return np.where(known > RESTS, known, np.maximum(known, sizes / case.t_end))
 
 
 def rounded(q: Floats) -> float:

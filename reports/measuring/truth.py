@@ -14,6 +14,7 @@ from crossbody.cases import Chaos, Tier, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.between import between
 from crossbody.cases.contacts import Contact, contacts
+from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Ledger
 
 TRUTH = "truth"  # name of the truth where engines have theirs, and of the row that judges it
@@ -123,6 +124,12 @@ def taken(run: Trajectory, some: NDArray[np.intp] | NDArray[np.bool_] | slice) -
         contact=run.ledger.contact[some], input=run.ledger.input[some], dissipated=run.ledger.dissipated[some]
     )
     return replace(run, **{name: getattr(run, name)[some] for name in names}, ledger=booked)
+
+
+@remembered(4)
+def dense(run: Trajectory) -> Callable[[Floats], Trajectory]:
+    """Return a motion between its samples, which asks nobody to integrate it anew."""
+    return between(run)
 
 
 def from_run(run: Trajectory, tier: Tier, source: str, touches: NDArray[np.bool_] | None = None) -> Truth:

@@ -88,7 +88,7 @@ def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     jump: those instants are left out.
     """
     rows = case.law.touches
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     if not rows.any() or not inside.any():
         return None
     smooth = away(exact, [switch.t for switch in truth.trajectory.switches if not switch.smooth], case.t_end)
@@ -223,7 +223,7 @@ def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None
     deepest = float(np.max(-truth.trajectory.gap[:, rows], initial=0.0))
     if deepest <= SHALLOW * float(np.max(np.abs(truth.trajectory.gap), initial=0.0)):
         return None
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     if not inside.any():
         return None
     return (

@@ -25,7 +25,7 @@ def contact_work(truth: Truth, run: Trajectory, case: Case) -> float | None:
     where the truth has none. The sum over all rows is in `energy_integrator`; here each row has its own.
     Instants of collisions that take no time are left out, as in `energy_drift`.
     """
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     scale = energy(truth.trajectory)
     if exact.ledger is None or scale == 0.0 or not inside.any() or not run.gap.shape[1]:
         return None
@@ -42,7 +42,7 @@ def energy_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
     Max |E(t) - E_truth(t)| / the truth's largest energy. Instants of collisions that take no time are left
     out: several may share one, and a sample does not say behind which it stands.
     """
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     scale = energy(truth.trajectory)
     if scale == 0.0 or not inside.any():
         return None

@@ -14,7 +14,7 @@ from crossbody.cases.rotations import differences, ways
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.equations import finite
 from crossbody.reports.measuring.impulse import away
-from crossbody.reports.measuring.scale import least, of_like
+from crossbody.reports.measuring.scale import least, of_like, scale_of_rates
 from crossbody.reports.measuring.truth import Truth
 
 UNITS = {"angle_error": "rad", "divergence_time": "s"}
@@ -33,7 +33,7 @@ def angle_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """
     if any(c.unit != "rad" for c in case.coordinates):
         return None
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     return float(np.max(np.abs(run.q[inside] - exact.q), initial=0.0))
 
 
@@ -45,7 +45,7 @@ def divergence_time(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """
     if case.law.unilateral.any() or not len(case.law.a0):
         return None
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     scale = float(np.max(np.abs(truth.trajectory.q), initial=0.0))
     off = np.max(differences(run.q[inside], exact.q, case.quaternions), axis=1) > APART * scale
     return float(run.t[inside][np.argmax(off)] if off.any() else run.t[inside][-1])
@@ -101,16 +101,15 @@ def _apart(off: Floats, motion: Floats, named: Sequence[Coordinate], rates: bool
 def velocity(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Velocity against the truth's on matched arcs, over the largest of each coordinate.
 
-    Max over samples and coordinates of |v - v_truth| / max |v_truth|, of its like where one rests. Only
-    touches are matched: a release that is off by dt shows as dt times the acceleration there. Instants of
-    collisions that take no time are left out: several may share one, and a sample does not say behind which
-    it stands.
+    Max over samples and coordinates of |v - v_truth| / max |v_truth|, of its like where one rests, and where all of
+    these do, over the rate that leads as far as positions are measured by (`scale_of_rates`). Only touches are
+    matched: a release that is off by dt shows as dt times the acceleration there. Instants of collisions that take no
+    time are left out: several may share one, and a sample does not say behind which it stands.
     """
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     if not inside.any():
         return None
-    shared = of_like(np.max(np.abs(truth.trajectory.v), axis=0), case.velocities)
-    scale = np.maximum(shared, least(case.velocities, rates=True))
+    scale = scale_of_rates(truth.trajectory, case)
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     off = np.abs(run.v[inside] - exact.v)[smooth] / scale
     return float(np.max(off, initial=0.0))

@@ -56,7 +56,7 @@ def lam_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     if np.isnan(run.lam).any():
         return math.nan
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     scale = float(np.max(np.abs(exact.lam), initial=0.0))
     off = float(np.max(np.abs(run.lam[inside] - exact.lam), initial=0.0))
     return off / max(scale, idle(truth.trajectory)) if scale else None
@@ -70,7 +70,7 @@ def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
     the same rule, so that the error of the rule cancels. Collisions that take no time have no lam and do not
     count: beside them a compliant truth has samples too few for its own integral.
     """
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     if not inside.any():
         return None
     if np.isnan(run.lam).any():
@@ -92,7 +92,7 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
     known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
     many; N s where only the run's does.
     """
-    inside, exact = aligned(truth, run, releases=True)
+    inside, exact = aligned(truth, run, case, releases=True)
     if not inside.any() or truth.trajectory.counts.get("redundant", 0):
         return None
     if np.isnan(run.lam).any():

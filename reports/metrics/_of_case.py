@@ -43,7 +43,7 @@ class OfCase:
         if own.signal is not None:
             if (values := own.signal(run, case)) is None:
                 return None
-            inside, exact = aligned(truth, run, releases=self.jumps)
+            inside, exact = aligned(truth, run, case, releases=self.jumps)
             theirs = own.signal(exact, case)
             return None if theirs is None else float(np.max(np.abs(values[inside] - theirs), initial=0.0))
         assert own.instants is not None

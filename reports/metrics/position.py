@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.cases.scene import WIDTHS, Scene
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.apart import errors
-from crossbody.reports.measuring.scale import RESTS, ROUNDING, least, of_like
+from crossbody.reports.measuring.scale import RESTS, ROUNDING, scale_of
 from crossbody.reports.measuring.truth import Truth, taken
 
 UNIT = "1"
@@ -19,7 +18,6 @@ ROUNDED = 1e-3
 """Coordinates below this, m or rad, are those of a mechanism that stands in its reference pose."""
 FEW = 20
 """Samples at which it is asked by how much gaps change with positions."""
-SMALL, STILL = 1e-6, 1e-9  # a coordinate that moves less than this part of its like rests
 
 
 def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -43,41 +41,8 @@ def where(truth: Truth, run: Trajectory, case: Case) -> str:
 
 
 def _errors(truth: Truth, run: Trajectory, case: Case) -> tuple[Floats, Floats]:
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     return errors(truth, taken(run, inside), exact, case)
-
-
-def scale_of(exact: Trajectory, case: Case) -> Floats:
-    """Return the largest |q_truth| (n,) of each coordinate; of its like, for one that rests but for rounding.
-
-    The joints of a scene, a robot's, are measured by the largest of their unit: one that hardly
-    moves in the truth, by the balance of others, tells of an engine that moves it how far that
-    is, and not how still it ought to be. But not by where bodies float, nor by more than a
-    radian, what other rotations are measured by: a robot far from the origin, or the turns of a
-    wheel, would hide what a finger does. Of what floats, each body is measured by where it is
-    itself. Where all of these rest, what the case says of their size. Errors below 1e-12, what
-    absolute tolerances are, pass the usual limit of 1e-6.
-    """
-    own: Floats = np.max(np.abs(exact.q), axis=0)
-    smallest = least(case.coordinates)
-    shared = of_like(own, case.coordinates)
-    if case.scene is not None:
-        own = shared = _of_joints(own, case, case.scene)
-    scale = np.where(shared < smallest, smallest, np.where(own > STILL * shared, np.maximum(own, SMALL), shared))
-    scale[list(case.quaternions)] = 1.0  # rad
-    return scale
-
-
-def _of_joints(own: Floats, case: Case, scene: Scene) -> Floats:
-    """Return what each coordinate (nq,) of a scene is measured by: its own largest, or that of the joints like it."""
-    widths = [WIDTHS[joint.type][0] for joint in scene.joints]
-    floats = np.repeat([joint.type == "free" for joint in scene.joints], widths)
-    turns = np.array([coordinate.unit == "rad" for coordinate in case.coordinates])
-    joints = of_like(np.where(floats, 0.0, own), case.coordinates)
-    shared = np.where(turns, np.minimum(joints, 1.0), joints)
-    for at in np.cumsum([0, *widths[:-1]])[[joint.type == "free" for joint in scene.joints]]:
-        shared[at : at + 3] = own[at : at + 3].max()
-    return np.maximum(own, shared)
 
 
 def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:

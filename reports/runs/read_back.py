@@ -195,7 +195,7 @@ def _beside(found: Trace, run: Trajectory, result: CaseResult) -> Iterator[str]:
     """Yield what differs of the truth beside a motion from what metrics compare it with: nothing where they do not."""
     if not len(run.t):
         return
-    inside, exact = aligned(result.truth, run)
+    inside, exact = aligned(result.truth, run, result.case)
     if (found.truth is None) == inside.any():
         yield "whether there is a truth beside it"
     if found.truth is None:
@@ -233,7 +233,7 @@ def _errors(found: Trace, first: Trace, result: CaseResult, judged: Sequence[Row
     touches, scales = case.law.touches, np.array(first.about["gap_scales"])
     gaps = np.abs(found.run.gap - found.truth.gap) / np.where(scales > 0.0, scales, 1.0)
     known = ~np.isnan(found.truth.q).all(axis=1)
-    beside = replace(found.truth, t=clock(truth, found.run))
+    beside = replace(found.truth, t=clock(truth, found.run, case))
     positions = errors(truth, found.run, beside, case)[0] / np.array(first.about["scales"])
     apart = {"position": positions, "gap_error": gaps[known][:, touches]}
     for row in judged:

@@ -22,9 +22,9 @@ from crossbody.reports.judging.comparison import judged, unlike_stored
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import COLUMNS, Row
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.scale import still
+from crossbody.reports.measuring.scale import scale_of, still
 from crossbody.reports.measuring.truth import TRUTH, Truth
-from crossbody.reports.metrics.position import gap_scale_of, scale_of
+from crossbody.reports.metrics.position import gap_scale_of
 from crossbody.reports.runs import files, read_back, watch
 from crossbody.reports.runs.jobs import CaseResult
 from crossbody.reports.runs.store import Trace, as_plain, save
@@ -211,14 +211,14 @@ def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
     about = _about(case, entry.engine, entry.profile) | {"settings": dict(entry.settings)}
     about["took_s"] = entry.took_s
     about["steps"] = _steps((entry.run if entry.clock is None else entry.clock.run).t)
-    return Trace(about=about, run=entry.run, truth=_beside(truth, entry.run))
+    return Trace(about=about, run=entry.run, truth=_beside(truth, entry.run, case))
 
 
-def _beside(truth: Truth, run: Trajectory) -> Trajectory | None:
+def _beside(truth: Truth, run: Trajectory, case: Case) -> Trajectory | None:
     """The truth at every sample of a run, impacts matched as in metrics; NaN where nothing is compared."""
     if not len(run.t):
         return None
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, case)
     if not inside.any():
         return None
 

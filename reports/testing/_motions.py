@@ -140,7 +140,7 @@ def _touches(run: Trajectory, truth: Truth, late: float) -> list[str]:
 
 
 def _signals(run: Trajectory, truth: Truth, of: Sequence[str], rtol: float, atol: float) -> Iterator[Signal]:
-    inside, exact = aligned(truth, run)
+    inside, exact = aligned(truth, run, None)
     for name in of:
         wanted: Floats = getattr(exact, name)
         largest = np.max(np.abs(getattr(truth.trajectory, name)), axis=0, initial=0.0)

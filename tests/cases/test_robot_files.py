@@ -36,7 +36,7 @@ from crossbody.reports.cli import cli
 from crossbody.reports.judging.run_verdicts import verdicts
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word
-from crossbody.reports.metrics.position import scale_of
+from crossbody.reports.measuring.scale import scale_of
 from crossbody.reports.runs import choice, jobs
 
 PUBLISHED = ("agility_cassie/cassie", "franka_emika_panda/panda", "robotiq_2f85/2f85", "unitree_go1/go1",

@@ -56,7 +56,7 @@ def test_where_a_slip_stops_the_clock_is_the_truths(times: float) -> None:
     truth = from_run(own, Tier.A, "itself")
     late = replace(own, t=times * own.t, events=tuple(replace(event, t=times * event.t) for event in own.events))
     (mine,), (theirs,) = ([e.t for e in run.events if e.after == Mode.STICK] for run in (late, own))
-    asked, plain = (clock(truth, late, releases)[late.t == mine] for releases in (True, False))
+    asked, plain = (clock(truth, late, CASE, releases)[late.t == mine] for releases in (True, False))
     assert asked == pytest.approx(theirs, abs=1e-12)
     assert plain == pytest.approx(mine, abs=1e-12)
 

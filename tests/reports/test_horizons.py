@@ -196,7 +196,7 @@ def test_an_impulse_does_not_depend_on_the_side_of_a_release_on_which_a_sample_s
     case = cases.load("ball_maze", "outside")
     truth = truth_of(case)
     run = engines.load("reference").prepare(case, "compiled", rtol=1e-9).run()
-    inside, exact = aligned(truth, run, releases=True)
+    inside, exact = aligned(truth, run, case, releases=True)
     theirs = with_collisions(exact, truth.trajectory.events)
     off = np.abs(with_collisions(run, run.events)[inside] - theirs).max() / np.abs(theirs).max()
     assert 0.0 < off < 1e-8

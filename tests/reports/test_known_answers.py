@@ -23,12 +23,14 @@ from crossbody.reports.judging import (
     known_sides,
     known_steps,
     known_tables,
+    known_touches,
     parts,
     truth,
 )
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring import alignment
+from crossbody.reports.measuring.laid import Laid
 from crossbody.reports.measuring.truth import shortened
 from crossbody.reports.metrics import event_gap
 from crossbody.reports.pages import (
@@ -108,6 +110,23 @@ def test_a_truth_that_is_asked_on_one_side_of_a_jump_is_told(monkeypatch: pytest
         assert {name for name, *_ in known_sides.wrong()} == {"lam_impulse"}
     finally:
         known_sides.wrong.cache_clear()
+
+
+@pytest.mark.parametrize(("laid", "said"), [(True, "slides"), (False, "bounces")])
+def test_a_clock_that_is_laid_on_every_touch_or_on_none_is_told(
+    laid: bool, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def always(truth: Any, run: Any, case: Any, here: Any, there: Any) -> Laid:
+        return Laid(at=there, on=np.append(True, np.full(len(there) - 1, laid)))
+
+    monkeypatch.setattr(alignment, "nearest", always)
+    known_touches.wrong.cache_clear()
+    try:
+        told = {(name, what) for name, _, _, what in known_touches.wrong()}
+    finally:
+        known_touches.wrong.cache_clear()
+    assert ("position", f"a body that {said} and touches late") in told
+    assert all(said in what for _, what in told)
 
 
 @pytest.mark.parametrize("times", [2.0, 0.1])

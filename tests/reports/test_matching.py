@@ -67,7 +67,7 @@ def test_the_clock_goes_forward_and_puts_touches_that_do_not_cross_on_the_truths
     exact = drawn(random, 3)
     found = [(row, t + float(random.normal()) * 10.0 ** random.uniform(-5.0, -1.0)) for row, t in exact]
     truth, run = known(exact, 3), told([(row, max(t, 1e-3)) for row, t in found], 3)
-    mapped: Floats = clock(truth, run)
+    mapped: Floats = clock(truth, run, None)
     assert np.all(np.diff(mapped) >= 0.0)
     for a, b in matched(truth, run)[:1]:
         others = [(c.touch, d.touch) for c, d in matched(truth, run) if c is not a]

@@ -37,7 +37,7 @@ NEAR = ("gap_error", "position")
 
 def test_the_clock_of_a_run_is_the_truths(one: Drawn) -> None:
     for releases in (False, True):
-        np.testing.assert_allclose(clock(one.truth, one.run, releases), one.t, atol=1e-9 * one.case.t_end)
+        np.testing.assert_allclose(clock(one.truth, one.run, one.case, releases), one.t, atol=1e-9 * one.case.t_end)
 
 
 OF_EQUATIONS = ("complementarity", "mode_residual", "mode_contradicted")
@@ -76,8 +76,10 @@ def test_positions_are_off_by_the_part_of_the_largest_of_each(one: Drawn) -> Non
     for j, unit in enumerate(units):
         at = next((a for a in case.quaternions if a <= j < a + 4), None)
         if at is not None:
-            turned = np.abs(np.sum(one.run.q[:k, at : at + 4] * exact.q[:k, at : at + 4], axis=1))
-            parts.append(2.0 * np.arccos(np.minimum(turned, 1.0)).max())
+            ways = [
+                np.linalg.norm(one.run.q[:k, at : at + 4] + sign * exact.q[:k, at : at + 4], axis=1) for sign in (-1, 1)
+            ]
+            parts.append(4.0 * np.arcsin(0.5 * np.min(ways, axis=0)).max())
             continue
         scale = own[j]
         if case.scene is not None and not case.quaternions:  # joints, which are measured by the largest of their like

@@ -76,9 +76,9 @@ def test_a_late_impact_is_an_error_of_time_not_of_position(truth: Truth, case: C
     assert measure("position", truth, late, case) < 2e-2
 
 
-def test_clock_puts_every_touch_on_the_truths(truth: Truth) -> None:
+def test_clock_puts_every_touch_on_the_truths(truth: Truth, case: Case) -> None:
     late = shifted(truth.trajectory, 2e-3)
-    mapped = clock(truth, late)
+    mapped = clock(truth, late, case)
     for mine, theirs in zip(contacts(late), contacts(truth.trajectory), strict=True):
         assert mapped[late.t == mine.touch] == pytest.approx(theirs.touch, abs=1e-14)
     assert np.all(np.diff(mapped) >= 0)

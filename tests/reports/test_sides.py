@@ -40,13 +40,13 @@ def test_what_jumps_is_beside_a_run_on_both_sides(seed: int) -> None:
     apart = draw.uniform(0.0, CASE.t_end, draw.integers(5, 100))
     times = np.concatenate([[0.0, CASE.t_end], apart[np.abs(apart - TURN) > 1e-5]])
     run = turned(off, times)
-    inside, exact = aligned(TRUTH, run)
+    inside, exact = aligned(TRUTH, run, CASE)
     assert inside.all()
     np.testing.assert_allclose(exact.lam, run.lam, rtol=1e-9, atol=1e-9)
     np.testing.assert_array_equal(exact.mode, run.mode)
     np.testing.assert_array_equal(exact.t, run.t)
     assert metrics.load("lam_impulse").measure(TRUTH, run, CASE) < 1e-9
-    known = [list(asked) for asked in instants(TRUTH, [run])]
+    known = [list(asked) for asked in instants(TRUTH, [run], CASE)]
     assert all(list(each) in known for each in asked_for(TRUTH, run))
 
 
@@ -60,7 +60,7 @@ def asked_for(truth: Truth, run: Trajectory) -> list[np.ndarray]:
         asked.append(t)
         return of(t)
 
-    aligned(replace(truth, at=at), replace(run))
+    aligned(replace(truth, at=at), replace(run), CASE)
     return asked
 
 
@@ -68,7 +68,7 @@ def test_what_is_farther_than_instants_are_judged_to_is_where_it_is() -> None:
     """Between the two events both samples of the run are before, or behind, the truth's."""
     off = 3.0 * shortest(CASE.t_end)
     for late in (off, -off):
-        _, exact = aligned(TRUTH, turned(late, np.linspace(0.0, CASE.t_end, 50)))
+        _, exact = aligned(TRUTH, turned(late, np.linspace(0.0, CASE.t_end, 50)), CASE)
         at = np.flatnonzero(exact.t == TURN + late)
         assert np.ptp(exact.lam[at], axis=0).max() == 0.0
 
@@ -76,7 +76,7 @@ def test_what_is_farther_than_instants_are_judged_to_is_where_it_is() -> None:
 def test_samples_between_two_events_part_them() -> None:
     """A run that has a sample between its event and the truth's tells there what it has: nothing is moved past it."""
     off = 0.5 * shortest(CASE.t_end)
-    _, exact = aligned(TRUTH, turned(off, np.array([0.0, TURN + 0.5 * off, CASE.t_end])))
+    _, exact = aligned(TRUTH, turned(off, np.array([0.0, TURN + 0.5 * off, CASE.t_end])), CASE)
     assert np.ptp(exact.lam[exact.t == TURN + off], axis=0).max() == 0.0
 
 
@@ -101,7 +101,7 @@ def test_jumps_of_several_rows_that_are_nearer_to_each_other_than_a_run_is_to_it
     late, t = draw.choice([-1.0, 1.0]) * draw.uniform(1e-9, 1e-7), np.array([0.0, *draw.uniform(0.0, 0.4, 5), 1.0])
     truth = from_run(pushed(at, np.sort(np.append(t, 0.9))), Tier.A, "made up")
     run = pushed(at + late, np.sort(t))
-    np.testing.assert_array_equal(aligned(truth, run)[1].lam, run.lam)
+    np.testing.assert_array_equal(aligned(truth, run, CASE)[1].lam, run.lam)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -118,6 +118,6 @@ def test_a_gap_that_is_of_another_edge_is_beside_a_run_on_both_sides(seed: int) 
     apart = draw.uniform(0.0, CASE.t_end, 20)
     times = np.concatenate([[0.0, CASE.t_end], apart[np.abs(apart - TURN) > 1e-5]])
     run = switched(turned(off, times), TURN + off)
-    inside, exact = aligned(truth, run, releases=True)
+    inside, exact = aligned(truth, run, CASE, releases=True)
     np.testing.assert_allclose(exact.lam, run.lam[inside], rtol=1e-9, atol=1e-9)
     assert metrics.load("lam_impulse_path").measure(truth, run, CASE) < 1e-9 + 10.0 * abs(off) / CASE.t_end
