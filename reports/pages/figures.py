@@ -428,7 +428,7 @@ def note(name: str, traces: Sequence[Trace], limits: Limits = NONE) -> str:
         if len(found) > MOST_SIGNALS:
             told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
         if name in IDLE_NOTES and (rest := [name for k, name in names.items() if k not in found]):
-            told.append(f"{IDLE_NOTES[name]}: {few(_normals(rest))}.")
+            told.append(f"{IDLE_NOTES[name]}: {few(normals(rest))}.")
     if name == "energy" and (
         without := [label(one) for one in traces if one.run.ledger is None and label(one) != TRUTH]
     ):
@@ -444,14 +444,14 @@ def few(names: Sequence[str], most: int = NAMED) -> str:
     return ", ".join(names[:most]) + more
 
 
-def _normals(names: Sequence[str]) -> list[str]:
+def normals(names: Sequence[str]) -> list[str]:
     """Names without the tangential rows of contacts that are among them."""
     return [name for name in names if not (name[-2:] in WAYS and name[:-3] in names)]
 
 
 def _same(traces: Sequence[Trace]) -> Iterator[str]:
     names = traces[0].about["contacts"]
-    same = [[names[first], *_normals([names[k] for k in (first, *rest)])[1:]] for first, *rest in alike(traces)]
+    same = [[names[first], *normals([names[k] for k in (first, *rest)])[1:]] for first, *rest in alike(traces)]
     groups = [f"same as {first}: {few(rest, 3)}" for first, *rest in same if rest]
     if groups:
         yield f"The {'; the '.join(groups[:NAMED])}{f'; and {len(groups) - NAMED} more' * (len(groups) > NAMED)}."
@@ -462,7 +462,7 @@ def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
     for contact, mode in changing(traces)[1]:
         found.setdefault(mode, []).append(contact)
     for mode, names in found.items():
-        yield f"{mode} throughout, in every engine: {few(_normals(names))}."
+        yield f"{mode} throughout, in every engine: {few(normals(names))}."
 
 
 MATCHED = "Coordinates, and |difference from the truth|, impacts matched"
