@@ -33,6 +33,9 @@ FIRST = {"motion": 3, "force": 2, "modes": 3, "penetration": 3}
 """Of these, how many are seen at once in each figure; the others are drawn when they are asked for."""
 BEYOND, FAR = 1.5, 4.0
 """Times the truth's largest force: up to which forces are drawn where any goes farther than the second."""
+SWINGS, OFTEN = 60.0, 4.0
+"""How often a force goes up or down by the truth's largest before its line is a comb that covers others, and times the
+truth's own."""
 NAMED = 6
 """Contacts without a force that are named; a robot has hundreds."""
 IDLE = 1e-9
@@ -223,10 +226,14 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
     largest = max(float(np.nanmax(np.abs(traces[0].run.lam), initial=0.0)), idle(traces[0].run))
     true = [_true_impulse(trace, traces[0]) for trace in traces]
     for place, k in enumerate(shown):
+        combs = chattering(traces, k)
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
                 continue
-            sheet.line(trace, 3 * place, trace.run.lam[:, k])
+            if label(trace) in combs:
+                sheet.band_of(trace, 3 * place, trace.run.lam[:, k], combs[label(trace)])
+            else:
+                sheet.line(trace, 3 * place, trace.run.lam[:, k])
             sheet.line(trace, 3 * place + 1, summed[i][:, k])
             if (exact := true[i]) is not None:
                 sheet.line(trace, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor), floor=floor)
@@ -271,6 +278,21 @@ def _noise(traces: Sequence[Trace]) -> float:
     """A force of rounding, of that which the energy makes over the way, N."""
     way = max(traces[0].about.get("scales", ()), default=0.0) or 1.0
     return IDLE * energy_of(traces[0].run) / way
+
+
+def chattering(traces: Sequence[Trace], k: int) -> dict[str, float]:
+    """Return the engines whose force of a contact goes up and down so often that its line would cover all others.
+
+    How often that is stands beside each, times the truth's largest.
+    """
+    largest = [float(np.nanmax(np.abs(one.run.lam[:, k]), initial=0.0)) for one in traces]
+    reach = largest[0] if label(traces[0]) == TRUTH and largest[0] > _noise(traces) else max(largest, default=0.0)
+    if not reach:
+        return {}
+    seen = [np.clip(np.nan_to_num(one.run.lam[:, k]), -BEYOND * reach, BEYOND * reach) for one in traces]
+    swings = [float(np.abs(np.diff(lam)).sum()) / reach for lam in seen]
+    own = swings[0] if label(traces[0]) == TRUTH else 0.0
+    return {label(one): n for one, n in zip(traces, swings, strict=True) if n > max(SWINGS, OFTEN * own)}
 
 
 def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, dict[str, float]]:
