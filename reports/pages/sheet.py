@@ -27,6 +27,7 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 group, between groups (with times), pixels."""
 NAME = 12  # height of the name of a line beside its plot, pixels
 SEEN = 6  # height of a band that is seen around the truth, pixels
+USUAL = "limit"  # what the limit of most engines is called
 NARROW = 4  # limits around the truth that are said, where they are narrower than its line
 LONG = 0.02  # part of the horizon: a line of errors is broken where a run has no sample for longer
 LEAP = 100.0  # times a floor: a line that goes from there farther within one sample is broken
@@ -169,17 +170,19 @@ class Sheet:
     def _seen(self) -> tuple[dict[int, list[tuple[float, str]]], list[str]]:
         """Half widths and names of the bands that are wider than the line that they are around, and what others are."""
         found: dict[int, list[tuple[float, str]]] = {}
-        narrow: dict[int, dict[str, None]] = {}
+        narrow: dict[int, dict[str, float]] = {}
         for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
             seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
             if 2.0 * half * PLOT > SEEN * np.ptp(seen):
                 found.setdefault(row, []).append((half, name))
             else:
-                unit = self.rows[row].partition("\n")[2].strip("[]")
-                narrow.setdefault(row, {})[f"±{half:.2g} {unit} ({name})"] = None
+                halves = narrow.setdefault(row, {})
+                halves[name] = min(half, halves.get(name, half))
         alike: dict[str, dict[str, None]] = {}
-        for row, texts in narrow.items():
-            alike.setdefault(", ".join(texts), {})[self.rows[row].partition("\n")[0]] = None
+        for row, halves in narrow.items():  # of several that nobody sees, the usual one is said, or the narrowest
+            name = USUAL if USUAL in halves else min(halves, key=lambda one: halves[one])
+            title, _, unit = self.rows[row].partition("\n")
+            alike.setdefault(f"±{halves[name]:.2g} {unit.strip('[]')} ({name})", {})[title] = None
         return found, [f"{', '.join(titles)} {text}" for text, titles in alike.items()]
 
     def _caption(

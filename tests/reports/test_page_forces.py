@@ -18,7 +18,7 @@ from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.figures import MOST_SIGNALS, carrying, chattering, force, motion, note, penetration, plots
 from crossbody.reports.pages.friction import hysteresis
-from crossbody.reports.pages.sheet import broken, off_scale
+from crossbody.reports.pages.sheet import Sheet, broken, off_scale
 from crossbody.reports.runs import study
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.runs.jobs import run_case
@@ -412,3 +412,13 @@ def test_a_force_of_a_few_periods_is_drawn_as_it_is(run: Trajectory, periods: in
     some = comb(run, 0, periods)
     assert not chattering([trace(run), trace(some, "fake")], 0)
     assert chattering([trace(comb(run, 1, 300)), trace(comb(run, 2, 300), "fake")], 0) == {}, "as the truth's"
+
+
+def test_of_several_limits_narrower_than_a_line_one_number_is_said_of_each_quantity(run: Trajectory) -> None:
+    sheet = Sheet(["depth a\n[m]", "depth b\n[m]"], "Depths", 100)
+    for row in (0, 1):
+        sheet.line(trace(run), row, run.q[:, 0])
+        for half, name in ((1e-6, "limit"), (6.7e-8, "limit"), (1e-8, "limit of fake:p"), (1e-7, "limit")):
+            sheet.band(row, half, name)
+    assert "Limits narrower than a line: depth a, depth b ±6.7e-08 m (limit)" in sheet.done()["layout"]["title"]["text"]
+    assert "fake" not in sheet.done()["layout"]["title"]["text"]
