@@ -26,7 +26,7 @@ from crossbody.reports.runs.store import Trace
 
 NAMED = 6
 """Numbers that a reason names."""
-PLOTTED = 900_000  # room for all plots of a page, bytes; the samples of each line follow from it
+PLOTTED = 800_000  # room for all plots of a page, bytes; the samples of each line follow from it
 RUNS = columns(
     called="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
     wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
