@@ -52,13 +52,18 @@ def test_no_event_is_far_from_one_that_a_button_leads_to(seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page of a ball and two engines: one touches 2000 times, one is off by a thousandth and more."""
+    """The page of a ball and three engines: one touches 2000 times, one is off, one presses wherever the ball is."""
     case = load("bouncing_ball", "linear")
     run = truth_of(case).trajectory
     off = replace(run, q=run.q + 0.05 * np.sin(3.0 * run.t)[:, None], events=run.events[:1])
+    pressed = replace(run, lam=np.full_like(run.lam, np.nanmax(run.lam)))
     given = [
         SimpleNamespace(engine="fake", profile=name, run=lambda one=one: one)
-        for name, one in (("chatters", replace(run, events=chattering(0, CHATTER, float(run.t[-1])))), ("off", off))
+        for name, one in (
+            ("presses", pressed),
+            ("chatters", replace(run, events=chattering(0, CHATTER, float(run.t[-1])))),
+            ("off", off),
+        )
     ]
     return page_of(case, tmp_path_factory.mktemp("playback") / "out", *given)
 
@@ -175,13 +180,13 @@ def test_arrows_stay_in_the_picture_however_long_they_are(view: str, page: Path,
     browser.js(SHAFTS)
     browser.js(f"{PICKED}('view', '{view}')")
     browser.js(f"{PICKED}('longer', 100)")
-    pressed = 1000.0 * float(run.t[np.argmax(run.lam[:, 0])]) / float(run.t[-1])
-    browser.js("window.shafts.length = 0")
-    browser.js(f"{PICKED}('clock', {pressed})")
-    ends = np.array(browser.js("window.shafts"))
     width, height = browser.js(
         "[document.querySelector('canvas').clientWidth, document.querySelector('canvas').clientHeight]"
     )
-    assert len(ends) > 6
-    assert np.all((ends >= 0.0) & (ends <= (width, height)))
-    assert np.ptp(ends[:, 1]) > 0.1 * height, "an arrow is seen"
+    for t in (run.t[np.argmax(run.lam[:, 0])], 0.0):  # deep in the floor, and high above it
+        browser.js("window.shafts.length = 0")
+        browser.js(f"{PICKED}('clock', {1000.0 * float(t) / float(run.t[-1])})")
+        ends = np.array(browser.js("window.shafts"))
+        assert len(ends) > 6
+        assert np.all((ends >= 0.0) & (ends <= (width, height)))
+        assert np.ptp(ends[:, 1]) > 0.1 * height, "an arrow is seen"
