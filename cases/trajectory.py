@@ -122,6 +122,9 @@ class Trajectory:
         unique_until: until when one motion alone keeps the law, s; finite where more than one set
             of sticking, sliding and open contacts does (`modes_not_unique`), or none that was found
             (`sticks_contradict`).
+        searched_until: until when no other motion can keep the law, or was searched for, s; finite
+            where too many contacts could change at one instant to try all their sets
+            (`not_searched`): what follows may be one motion of several.
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 
@@ -144,6 +147,7 @@ class Trajectory:
     control_s: float = 0.0
     determined_until: float = math.inf
     unique_until: float = math.inf
+    searched_until: float = math.inf
     sol: Callable[..., tuple[Floats, Floats]] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -22,7 +22,7 @@ from crossbody.engines._line import Line, followed, law_name, line
 from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_not
 from crossbody.engines.contract import Engine
 
-METHODS = ("DOPRI5", "DVERK6", "ODE23")
+METHODS = ("DOPRI5", "ODE23")  # the others Exudyn names, but has not
 ATOL_PART = 1e-3  # absolute tolerance in units of the relative one
 LONGEST = 0.1  # s: as no step is rejected that jumps over a contact
 SHORTEST = 1e-14  # s
@@ -150,9 +150,21 @@ def _simulation(case: Case, used: Mapping[str, Any]) -> tuple[Any, Any]:
     return settings, getattr(exu.DynamicSolverType, str(used["method"]))
 
 
-def _integrator(case: Case, scene: Line, model: Model, used: Mapping[str, Any]) -> Callable[[], Trajectory]:
-    settings, solver = _simulation(case, used)
-    mbs, limit = model.mbs, int(used["max_steps"])
+def _set(settings: Any, solver: Any) -> dict[str, Any]:
+    """Return settings as Exudyn's solver is given them; fixed steps divide the horizon, and are counted."""
+    time = settings.timeIntegration
+    if solver == exu.DynamicSolverType.GeneralizedAlpha:
+        return {}
+    if float(time.absoluteTolerance) != ATOL_PART * float(time.relativeTolerance):
+        return {"rtol": math.nan}
+    return {"rtol": float(time.relativeTolerance), "method": solver.name}
+
+
+def _integrator(
+    case: Case, scene: Line, model: Model, simulation: tuple[Any, Any], limit: int
+) -> Callable[[], Trajectory]:
+    settings, solver = simulation
+    mbs = model.mbs
 
     begun = [0]
 
@@ -254,9 +266,11 @@ class Exudyn(Engine):
             if profile == "matched"
             else {"method": "GeneralizedAlpha", "springs": _said(_springs(model))}
         )
+        simulation = _simulation(case, used)
         return PeerRun(
             engine=self.name, profile=profile, settings=used | extra,
-            integrate=_integrator(case, scene, model, used), physics=_audit(case, scene, model),
+            integrate=_integrator(case, scene, model, simulation, int(used["max_steps"])),
+            physics={**_audit(case, scene, model), "set": _set(*simulation)},
             follows=followed(case, scene) if profile == "matched" else None,
         )  # fmt: skip
 

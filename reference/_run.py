@@ -286,6 +286,7 @@ class CompiledRun:
             else None,
             determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
             unique_until=float(state["unique_until"]) if state["not_unique"] or state["unmet"] else np.inf,
+            searched_until=float(state["searched_until"]) if state["not_searched"] else np.inf,
         )  # fmt: skip
         if self.callback is not None:
             controller = self.callback.controller

@@ -206,7 +206,7 @@ def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) ->
 
 
 @cli.command()
-@click.argument("name", metavar="CASE", shell_complete=options.names_of("cases"))
+@click.argument("name", metavar="CASE", type=click.Choice(("soft_contact",)), expose_value=False)
 @options.parameters
 @options.out()
 @speaks
@@ -236,6 +236,11 @@ def analyse(**asked: Any) -> int:
 
     For each: poles, ranks, responses, and maps over a parameter or the workspace.
     """
+    from crossbody import cases
+    from crossbody.reports.runs.choice import parse_settings
+
+    # What is wrong is told before anything is compiled.
+    cases.load(asked["name"], asked["variant"], **parse_settings(asked["pairs"]))
     return _do("analyse.analyse", **asked, command=options.command())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Coordinate, Inputs, Limit, Parameter, Value
 from crossbody.cases.control import Control
-from crossbody.cases.errors import SceneError, several
+from crossbody.cases.errors import InvalidValue, SceneError, several, shown
 from crossbody.cases.files.controls import pushed, read_control, read_controls, under
 from crossbody.cases.files.reading import check_text, existing, findings_of, model_of, read, scene_of
 from crossbody.cases.rotations import normalised
@@ -38,6 +38,13 @@ PARAMETERS = {
     ),
     "push": Parameter(
         default="", doc="forces: BODY FX FY FZ T0 T1, N and s, at its centre of mass; several separated by ;"
+    ),
+    "start": Parameter(
+        default="",
+        doc="coordinates at the start, in place of the keyframe's: NAME VALUE, m or rad; several separated by ;",
+    ),
+    "rate": Parameter(
+        default="", doc="velocities at the start, in place of the keyframe's: NAME VALUE, m/s or rad/s; separated by ;"
     ),
     "rank": Parameter(
         default=-1,
@@ -96,11 +103,12 @@ class FileCase:
         q0 = self.model.qpos0 if index < 0 else self.model.key_qpos[index]
         v0 = np.zeros(self.model.nv) if index < 0 else self.model.key_qvel[index]
         model, told = read(self.path, str(p["without"]))
+        scene = scene_of(self.path, model).replace(friction=p["friction"] == 1)
+        q0, v0 = changed("start", q0, coordinates(scene), p), changed("rate", v0, coordinates(scene, RATES), p)
         if p["assemble"]:
             q0, v0 = assembled(model, q0, v0)
         ctrl = np.zeros(self.model.nu) if index < 0 else self.model.key_ctrl[index]
         act0 = np.zeros(self.model.na) if index < 0 else self.model.key_act[index]
-        scene = scene_of(self.path, model).replace(friction=p["friction"] == 1)
         scene = overruled(scene, float(p["a0"]), float(p["a1"]))
         inputs = read_controls(Path(str(p["ctrl"])), scene) if p["ctrl"] else held(scene, ctrl)
         scene, inputs = pushed(scene, inputs, str(p["push"]))
@@ -110,6 +118,26 @@ class FileCase:
             inputs=inputs, parameters=p, file=str(self.path.resolve()),
         )  # fmt: skip
         return under(case, read_control(str(p["control"]), float(p["tick"]))) if p["control"] else case
+
+
+def changed(name: str, values: Floats, of: Sequence[Coordinate], given: Mapping[str, Value]) -> Floats:
+    """Return what a start has with the numbers that a parameter gives some of its entries by name.
+
+    Raises:
+        InvalidValue: for what is no number of an entry; entries of quaternions are no freedoms, and have none.
+    """
+    found, free = np.array(values), {one.name: at for at, one in enumerate(of) if one.unit != "1"}
+    for part in filter(str.strip, str(given[name]).split(";")):
+        entry, _, number = part.strip().rpartition(" ")
+        try:
+            value = float(number)
+        except ValueError:
+            value = np.nan
+        if entry.strip() not in free or not np.isfinite(value):
+            valid = f"NAME VALUE, finite, of {', '.join(free)}"
+            raise InvalidValue(f"{name}: {shown(part.strip())} is no number of an entry; valid: {valid}.")
+        found[free[entry.strip()]] = value
+    return found
 
 
 def open_file(name: str) -> FileCase:

@@ -55,6 +55,7 @@ from crossbody.reference.core.layout import (
     open_model,
     open_work,
 )
+from crossbody.reference.core.others import note_first
 from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
@@ -95,7 +96,7 @@ def _restart(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     code = instant.ask(instant.SETTLE, K, s, m, w, b)
     if code != 0:
         return int(code)
-    s.unsettled, s.jumps, s.watched = 0, 1, 0
+    s.unsettled, s.jumps, s.watched, s.drifts = 0, 1, 0, 0
     peaks.forget(s, w, b.mode)
     s.method = EXPLICIT
     s.stalled, s.hold, s.full_jacobian = 0, 0, 0
@@ -170,8 +171,11 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         return PAINLEVE
     if s.frictional and code == MODE_CYCLE and instant.ask(instant.ALL_JAM, K, s, m, w, b) != 0:
         return PAINLEVE
-    if jam and code == 0 and not s.indeterminate:  # other modes go on from there, and no law says which
-        s.indeterminate, s.determined_until = 1, s.t
+    if jam and code == 0:
+        _leave_open(s)
+    if s.near_jam and code == 0:
+        note_first(s, True)
+        s.not_unique += 1
     if code == 0 and s.audited:
         code = audit.account(K, s, m, w)
     if code == 0:
@@ -190,8 +194,28 @@ def _sticks_too_hard(s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 @compiled
 def _stuck(K: Any, s: Any, m: Model, w: Work, b: Buffers, code: int) -> int:
-    """Why time does not go on: contacts are about to jam, or what a step found."""
-    return int(PAINLEVE if s.frictional and instant.ask(instant.JAM, K, s, m, w, b) != 0 else code)
+    """Have the step taken anew clear of a jam to which contacts are about to come, or say why time does not go on."""
+    if not (s.frictional and instant.ask(instant.JAM, K, s, m, w, b) != 0):
+        return code
+    copy(b.mode, w.before)
+    s.jam = 1
+    found = _restart(K, s, m, w, b)
+    s.jam, s.standing, same = 0, 0, True
+    for i in range(s.nc):
+        same = same and b.mode[i] == w.before[i]
+    if found == 0 and not same:
+        _leave_open(s)
+        record.here(K, s, m, w, b.mode, b.out, b.modes, False)
+        return TOO_LONG
+    instant.ask(instant.JAM, K, s, m, w, b)  # it marks them
+    return PAINLEVE
+
+
+@compiled
+def _leave_open(s: Any) -> None:
+    """Note that from the present instant on other modes go on where contacts jammed, and no law says which."""
+    if not s.indeterminate:
+        s.indeterminate, s.determined_until = 1, s.t
 
 
 @compiled
@@ -234,7 +258,8 @@ def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     s.trial_rhs += s.rhs - before_rows  # what is written down is no work of the method, and chooses none
     s.standing = s.standing + 1 if fired and t - s.t_old <= STILL * ULP * abs(t) else 0
     if s.standing > STANDSTILL + s.nc + 1:
-        return _stuck(K, s, m, w, b, STEP_TOO_SMALL)
+        code = _stuck(K, s, m, w, b, STEP_TOO_SMALL)
+        return 0 if code == TOO_LONG else code
     if not fired:
         return _arrive(K, s, m, w, b, t, at_stop)
     _land(K, s, m, w)

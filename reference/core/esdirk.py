@@ -167,17 +167,26 @@ def _residual(s: Any, w: Work, g: float) -> None:
 
 @compiled
 def _update(K: Any, s: Any, m: Model, w: Work, t: float, g: float) -> float:
-    """Solve for the correction, apply it to V and Q; returns its size in units of the tolerance."""
+    """Solve for the correction, apply it to V and Q; returns its size in units of the tolerance.
+
+    One of rounding is none: a slip is a sum of all velocities, known to no more than the fastest of them.
+    """
     n, nq = s.n, s.nq
     solve_lu(w.J, n, w.pivot, w.d)
-    size = 0.0
+    size, fastest, rounding = 0.0, 0.0, True
     for a in range(n):
+        fastest = max(fastest, abs(w.ys[nq + a]))
+    for a in range(n):
+        rounding = rounding and abs(w.d[a]) <= ULP * fastest
         w.ys[nq + a] += w.d[a]
         size = max(size, abs(w.d[a]) / _scale(s, w, nq + a))
         if not s.has_velocity:
             w.ys[a] += g * w.d[a]
             size = max(size, g * abs(w.d[a]) / _scale(s, w, a))
-    return max(size, _follow(K, s, m, w, t, g)) if s.has_velocity else size
+    if s.has_velocity:
+        moved = _follow(K, s, m, w, t, g)
+        size, rounding = max(size, moved), rounding and moved < np.inf
+    return 0.0 if rounding else size
 
 
 @compiled

@@ -26,7 +26,6 @@ from crossbody.reference.core.friction import (
     has_friction,
     is_dry,
     least_slip,
-    most_drift,
     slip,
     slip_along,
     small_slip,
@@ -75,6 +74,7 @@ from crossbody.reference.kinds import Bytes
 
 EARLY = 0.5  # part of a step before which a gap that opens again has been below zero for too few of its places
 WITH_IT, BEFORE_IT = 1.2, 0.5  # of what a step up to an event is, that is taken anew with or without it
+MATTERS = 1e3  # times as deep as a gap is known to, from which on what presses there is looked for by shorter steps
 PULLS = 1e-6  # part of the largest force by which a contact pulls that is no rounding of where it lets go
 
 
@@ -259,8 +259,9 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
         return TOO_LONG
     if s.theta <= 1.0:
         _tie(s, w)
-        if _leaves_early(s, w, mode):
-            s.theta *= WITH_IT
+        early = _leaves_early(s, w, mode)
+        if early < EARLY:
+            s.theta = WITH_IT * early
             return TOO_LONG
         if s.frictional:
             _stop_first(K, s, m, w, mode)
@@ -271,16 +272,20 @@ def scan(K: Any, s: Any, m: Model, w: Work, mode: Bytes) -> int:
 
 
 @compiled
-def _leaves_early(s: Any, w: Work, mode: Bytes) -> bool:
-    """Whether a gap that nothing presses shut passes below the surface, and out again, in a small part of the step.
+def _leaves_early(s: Any, w: Work, mode: Bytes) -> float:
+    """Where a gap that nothing presses shut, and that is below the surface, first passes out of it; NEVER if none does.
 
-    Free flight may be one step of any length: in one so long its places show nothing of when the contact presses.
+    Free flight may be one step of any length: in one so long its places show nothing of when the contact presses. Where
+    another event comes before, that counts for a gap that goes far deeper than it is known to.
     """
-    leaves = False
-    for i in range(s.nc if s.theta < EARLY and s.method != EXACT else 0):
-        below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s)  # not by rounding, as one that rests
-        leaves = leaves or (below and w.hit[i] <= s.theta and w.kind[i] == LEAVE and mode[i] == BALLISTIC)
-    return bool(leaves)
+    first = NEVER
+    for i in range(s.nc if s.method != EXACT else 0):
+        if w.kind[i] == LEAVE and mode[i] == BALLISTIC and w.hit[i] < first:
+            depth = -0.25 * w.rates[0, i] * w.hit[i] * s.hs  # of a parabola
+            below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s)  # not by rounding, as one that rests
+            if below and (w.hit[i] <= s.theta or depth > MATTERS * known(s, w)):
+                first = w.hit[i]
+    return float(first)
 
 
 @compiled
@@ -337,7 +342,7 @@ def catches_too(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
 
     The rows still in contact are those before either. One of them alone would press for both, and rounding choose it.
     """
-    closes = s.frictional and mode[i] == BALLISTIC and has_friction(m, i) and w.gap[i] <= 0.0 and w.rate[i] < 0.0
+    closes = s.frictional and mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
     return bool(closes and abs(off_law(K, s, m, w, i, s.t, w.y[: s.nq], w.y[s.nq :])) <= decided_to(s))
 
 
@@ -366,13 +371,6 @@ def pulling(s: Any, m: Model, w: Work, mode: Bytes) -> int:
 
 
 @compiled
-def drifts_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
-    """Whether contact i sticks no better than another one that has just been found not to."""
-    sticks = has_friction(m, i) and mode[i] == STICK and not is_dry(m, i)
-    return bool(sticks and 2.0 * slip(m, w, i, w.rate) > most_drift(s))
-
-
-@compiled
 def stops(s: Any, m: Model, w: Work, i: int) -> bool:
     """Whether what fired of contact i is the end of its slip: without a direction, as far as known, none jams in it."""
     return bool(w.kind[i] == STOP or (w.kind[i] == JAM and slip(m, w, i, w.rate) <= small_slip(s)))
@@ -397,11 +395,11 @@ def after(s: Any, m: Model, w: Work, mode: Bytes, i: int, h: float) -> int:
         return CONTACT
     if kind == CONE and s.growth >= 1.0 and not w.begins[i]:
         return int(mode[i])  # rows that depended on others do so no more: what that makes of the modes is decided
-    if kind in (CONE, DRIFT):
+    if kind == CONE:
         return SLIP
     if stops(s, m, w, i):
         return STICK
-    if kind == JAM:
+    if kind in (JAM, DRIFT):
         return int(mode[i])  # whether any other set of modes goes on is decided with all of them
     if kind == TOUCH and s.fsm == LEVEL and w.rate[i] > 0.0:
         return int(mode[i])

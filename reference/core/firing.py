@@ -9,7 +9,17 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import events, guards, journal, settle
 from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, scatter
-from crossbody.reference.core.friction import BEGIN_SLIP, DETERMINANT, DIES_INTO_JAM, NOTHING, ask, has_friction, is_dry
+from crossbody.reference.core.friction import (
+    BEGIN_SLIP,
+    DETERMINANT,
+    DIES_INTO_JAM,
+    NEAR_JAM,
+    NOTHING,
+    ask,
+    has_friction,
+    is_dry,
+)
+from crossbody.reference.core.jams import JAMMING
 from crossbody.reference.core.layout import (
     BALLISTIC,
     FREE,
@@ -26,8 +36,6 @@ from crossbody.reference.core.layout import (
 from crossbody.reference.core.machine import active_mode
 from crossbody.reference.core.stops import presses_alone
 from crossbody.reference.kernels import LOST as IS_LOST
-
-JAMMING = 1e-2  # determinant, of rows of size 1, below which contacts are about to jam where no step is short enough
 
 
 @compiled
@@ -48,6 +56,8 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
             stopped = stopped or events.stops(s, m, w, i)
             drifts = drifts or w.kind[i] == guards.DRIFT
             caught = caught or w.kind[i] == guards.CATCH
+            if s.frictional and w.kind[i] == guards.RELEASE and not has_friction(m, i):
+                w.let_go[i] = s.t
             if after != b.mode[i]:
                 touched = touched or b.mode[i] == FREE
                 journal.move(s, b, i, after)
@@ -55,9 +65,7 @@ def fire(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     for i in range(s.nc if stopped else 0):
         if events.stops_too(s, m, w, b.mode, i):
             journal.move(s, b, i, STICK)
-    for i in range(s.nc if drifts else 0):
-        if events.drifts_too(s, m, w, b.mode, i):
-            journal.move(s, b, i, SLIP)
+    s.drifts = drifts
     for i in range(s.nc if caught else 0):
         if events.catches_too(K, s, m, w, b.mode, i):
             journal.move(s, b, i, active_mode(s, m, w, i))
@@ -83,7 +91,7 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
     One that lets go where it pulls has jammed if its force has changed its sign through infinity. Leaves in s.jumps
     whether loads jump: not where a force reaches its bound or vanishes.
     """
-    slips, jam, released, s.jumps = False, False, False, 0
+    slips, jam, released, s.jumps, s.near_jam = False, False, False, 0, 0
     for i in range(s.nc):
         if w.hit[i] <= s.theta:
             s.jumps |= w.kind[i] not in (guards.CONE, guards.RELEASE, guards.LEAVE)
@@ -97,6 +105,7 @@ def _slip_or_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
         jam = jam or (pulls >= 0 and w.kind[pulls] == guards.RELEASE and ask(DETERMINANT, s, m, w, pulls) <= 0.0)
         if slips:
             ask(BEGIN_SLIP, s, m, w, NOTHING)
+        s.near_jam = ask(NEAR_JAM, s, m, w, NOTHING) > 0.0
     return jam
 
 

@@ -24,8 +24,8 @@ TOLERATED = 1e-10  # part of the largest acceleration by which a set of modes ma
 
 (
     BEGIN, FACTOR, SOLVE, RESPOND, DETERMINANT, MARGIN, WATCH, TURNING_RATE, TURN_PART, RENEW, TURNS_ASIDE, STANDS,
-    HOLDS_ON, BEGIN_SLIP, DECIDE, SETTLED, JAMS, DIES_INTO_JAM,
-) = np.arange(18)  # fmt: skip
+    HOLDS_ON, BEGIN_SLIP, DECIDE, SETTLED, JAMS, DIES_INTO_JAM, NEAR_JAM,
+) = np.arange(19)  # fmt: skip
 NOTHING, BEGUN = np.arange(2)  # beside what is asked of all rows together, and of slips that have just begun
 
 

@@ -26,6 +26,7 @@ from crossbody.reference.core.friction import (
     HOLDS_ON,
     JAMS,
     MARGIN,
+    NEAR_JAM,
     RENEW,
     RESPOND,
     SETTLED,
@@ -80,6 +81,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     DECIDE          modes of all contacts at this instant, in w.state; a code, and with it in w.wants whom it is about
     JAMS            how far the contact that slides nearest to a jam is from it; that of each into w.cones[i]
     DIES_INTO_JAM   1 if contact i, whose slip dies out, jams before it is at rest; what lets go on the way does so
+    NEAR_JAM        1 if forces of what has fired are not known, so near to a jam
     SETTLED         follow what the law leaves open, where modes have settled
     """
     if what == FACTOR:
@@ -121,6 +123,8 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
         undetermined.follow_shares(s, m, w, True)
     elif what == DIES_INTO_JAM:
         return 1.0 if stops.dies_into_jam(s, m, w, i) else 0.0
+    elif what == NEAR_JAM:
+        return 1.0 if jams.near(s, m, w) else 0.0
     elif what == JAMS:
         return float(jams.watch(s, m, w, w.cones[i]))
     elif what == BEGIN:

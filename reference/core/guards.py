@@ -90,6 +90,8 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
         # A slip that grazes zero goes on; one that has just begun is known no better than a slip with no direction.
         below = small_slip(s) if has_begun(w, i) else GRAZE * least_slip(s)
         w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + below
+    elif kind == DRIFT and 2.0 * slip(m, w, i, w.rates[0]) > most_drift(s):
+        w.bands[0] = 2.0 * slip(m, w, i, w.rates[0]) - most_drift(s)  # it has been found to move: until it does so more
     elif kind == CONE:
         begun = max(ON_BOUND * bound(m, i, abs(w.lams[0, i])), w.tolerated[i])
         if w.cones[0, i] <= begun:
@@ -205,7 +207,7 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
         elif kind == STOP:
             row[node] = slip_along(m, w, i, w.rates[node]) + w.bands[0]
         elif kind == DRIFT:
-            row[node] = most_drift(s) - slip(m, w, i, w.rates[node])
+            row[node] = most_drift(s) - slip(m, w, i, w.rates[node]) + w.bands[0]
         elif kind in (CONE, JAM):
             row[node] = w.cones[node, i] + w.bands[0]
         else:

@@ -14,6 +14,8 @@ from crossbody.reference.core.unknowns import fill
 from crossbody.reference.kinds import Array, Bytes, Floats, Index
 
 JAMMED = 1e-9  # determinant, of rows of size 1, that counts as none
+JAMMING = 1e-2  # below which contacts are about to jam where no step is short enough
+KNOWN_BY = 1e2  # times the tolerance, below which forces are not known
 
 
 @compiled
@@ -116,6 +118,23 @@ def determinant(s: Any, m: Model, w: Work, j: int) -> float:
         return -JAMMED
     w.seen[:] = 0
     return _signed_product(w.first, rank, w.down, w.across, w.seen) - JAMMED
+
+
+@compiled
+def near(s: Any, m: Model, w: Work) -> bool:
+    """Whether what has fired is of rows that bear on contacts so near to a jam that their forces are not known.
+
+    Forces are off by the tolerance over the determinant: before a jam one reaches a bound, or vanishes, by that alone.
+    Not asked where rows depend on each other, which would take the factors that hold them.
+    """
+    for j in range(s.na if s.short == 0 else 0):
+        i = w.idx[j]
+        slides = has_friction(m, i) and w.slides[i] and not is_dry(m, i)
+        if slides and determinant(s, m, w, j) < min(KNOWN_BY * s.rtol, JAMMING):
+            for a in range(s.na):
+                if w.reached[a] and w.hit[w.idx[a]] <= s.theta:
+                    return True
+    return False
 
 
 @compiled

@@ -105,6 +105,7 @@ STATE = np.dtype(
         ("lenient", "f8"),  # the most that an evaluation may find of it
         ("parting", "i8"),  # at the step's end it is more than is allowed
         ("strict", "i8"),  # no rows that stick may contradict each other where modes are decided
+        ("drifts", "i8"),  # contacts that stick have been found to move: they contradict each other, however slightly
         ("barred", "i8"),  # 1 + the contact that lets go for ever as long as it may press at this instant, 0 for none
         ("redundant", "i8"),  # the most rows at one instant that follow from others
         ("have_dense", "i8"),
@@ -181,8 +182,10 @@ STATE = np.dtype(
         ("unmet", "i8"),  # instants at which sticks contradicted each other in every set that was found,
         ("unique_until", "f8"),  # s: and the first of either
         ("not_searched", "i8"),  # instants at which there were too many sets to see whether another was
+        ("searched_until", "f8"),  # s: and the first of these
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides
         ("jam", "i8"),  # contacts have just come to where they jam together
+        ("near_jam", "i8"),  # what has fired is that of contacts so near to a jam that their forces are not known
         ("jammed", "i8"),  # contacts that slide have passed a jam in the step just taken
         ("pressed_in", "i8"),  # a contact that jams in a set that was tried, -1 if none does
         ("leeway", "f8"),  # what accelerations of rows may be off by beyond rounding

@@ -336,10 +336,35 @@ def _would_press(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int, at_rest
 @compiled
 def _is_held(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether row i, below the surface, depends on the active rows and follows its law with them."""
+    if s.frictional:
+        return _is_held_beside_friction(K, s, m, w, mode, i)
     if not w.shares[i] or s.na == 0:
         return False
     lam = multiplier_if_active(K, s, m, w, mode, i, s.t, w.y[: s.nq], w.y[s.nq :])
     return bool(w.tied[i] and lam > 0.0)
+
+
+@compiled
+def _is_held_beside_friction(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
+    """Whether row i, which has no friction, depends on the active rows and follows its law with them.
+
+    Those it depends on may let go later on, as it opens: whether it then takes over rounding must not have chosen.
+    """
+    lifted = (s.t - w.let_go[i]) * max(np.sqrt(w.law[i, 0]), w.law[i, 1]) <= LIFTED
+    if has_friction(m, i) or s.na == 0 or lifted:
+        return False
+    _alone(K, m, w, s.na, i, s.t, w.y[: s.nq], w.y[s.nq :])
+    if abs(_off_law(m, w, s.na, i, 1.0, w.y[s.nq :], w.k[START, s.nq :])[0]) > decided_to(s):
+        return False
+    before, kept = s.dependent_rows, mode[i]
+    mode[i] = CONTACT
+    activate(s, m, w, mode)
+    code = accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL)
+    depends = code == 0 and s.dependent_rows > before
+    mode[i] = kept
+    activate(s, m, w, mode)
+    accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t, w.y[: s.nq], w.y[s.nq :], GENERAL)
+    return bool(depends)
 
 
 @compiled

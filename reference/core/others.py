@@ -138,6 +138,7 @@ def count_others(s: Any, m: Model, w: Work) -> None:
         if is_decided(w, w.idx[j]) and sets <= FEW:
             sets *= _choices(m, w, w.idx[j])
     if sets > FEW:
+        s.searched_until = s.t if s.not_searched == 0 else s.searched_until
         s.not_searched += 1
         return
     evaluate_set(s, m, w)

@@ -166,7 +166,9 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
     for i in range(s.nc):
         if has_friction(m, i) and w.slides[i]:
             _forget(s, m, w, i, slip(m, w, i, rate))
-            if slip(m, w, i, rate) > small_slip(s):
+            if has_begun(w, i) and slip_along(m, w, i, rate) < -small_slip(s):
+                w.hit[i], w.kind[i], linger = 0.0, STOP, True  # it has passed zero, by less in each step than is known
+            elif slip(m, w, i, rate) > small_slip(s):
                 face(m, w, i, rate)
             if m.tangents[i] > 1:
                 s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|

@@ -22,6 +22,7 @@ from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_path import approached
 from crossbody.reference.core.mode_search import ALL, WORST, iterate, judge, near_sets, swept
 from crossbody.reference.core.mode_set import (
+    DIFFERENT,
     evaluate_set,
     face_against,
     first_row,
@@ -38,7 +39,7 @@ from crossbody.reference.core.mode_set import (
 from crossbody.reference.core.others import count_others, note_first
 from crossbody.reference.core.slips import face, note_speed
 
-BESIDE_A_JAM = 1e-8  # part of the largest acceleration by which rows may be off where two would jam together
+BESIDE_A_JAM = DIFFERENT  # part of the largest acceleration by which rows may be off where two would jam together
 AT_BOUND = 2.0 * (1.0 - INSIDE)  # part of its bound below it at which a contact has reached it, where loads are shared
 ITSELF, BESIDE = 1, 2  # has reached its bound; with one that has
 SLIGHT = 1e-6  # part of the largest acceleration by which sticks may contradict each other
@@ -83,6 +84,24 @@ def _hold_what_stands(s: Any, m: Model, w: Work) -> None:
         return
     put_back(s, m, w)
     judge(s, m, w)
+
+
+@compiled
+def _press_where_held(s: Any, m: Model, w: Work) -> None:
+    """Let rows without friction press that have been found off, but are held at their law by others they depend on.
+
+    All bodies move the same; which of those rows are in contact rounding would choose, and it matters where they open.
+    """
+    for j in range(s.na):
+        i = w.idx[j]
+        held = is_decided(w, i) and not has_friction(m, i) and w.state[i] == FREE
+        if held and abs(w.excess[j]) <= decided_to(s):
+            before = s.dependent_rows
+            keep(s, w)
+            put(m, w, i, STICK)
+            if not (judge(s, m, w) < 0 and s.dependent_rows > before and jammed(s, m, w) < 0):
+                put_back(s, m, w)
+                judge(s, m, w)
 
 
 @compiled
@@ -134,7 +153,7 @@ def _meet_all(s: Any, m: Model, w: Work) -> None:
         i = w.idx[j]
         if has_friction(m, i) and w.state[i] == STICK:
             most = max(most, off_stick(s, m, w, i))
-    if most <= SLIGHT * s.push_scale:
+    if most <= (0.0 if s.drifts else SLIGHT * s.push_scale):
         return
     s.strict = 1
     if not _found(s, m, w):
@@ -209,6 +228,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     if s.one_by_one:
         _begin_at_last(s, m, w)
     _hold_what_stands(s, m, w)
+    _press_where_held(s, m, w)
     count_others(s, m, w)
     s.strict = 0
     for j in range(s.na):

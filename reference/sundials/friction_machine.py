@@ -245,6 +245,7 @@ class FrictionMachine(LevelMachine):
             several = problem.others(found)
             self.told += Counter(["not_searched"] * (several is None) + ["not_unique"] * bool(several))
             self.unique_until = min(self.unique_until, t) if several else self.unique_until
+            self.searched_until = min(self.searched_until, t) if several is None else self.searched_until
             return found
         ways = self._ways_of(seen) | {
             i: slip / np.linalg.norm(slip)

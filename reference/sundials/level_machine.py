@@ -117,7 +117,7 @@ class LevelMachine:
         self._all_spent, self._shared = set[int](), -np.inf
         self.tied: dict[int, float] = {}
         self._lifted: dict[int, float] = {}
-        self.redundant, self.told, self.unique_until = 0, Counter[str](), np.inf
+        self.redundant, self.told, self.unique_until, self.searched_until = 0, Counter[str](), np.inf, np.inf
         self._bilateral = [i for i in range(system.nc) if not self.switching[i] and self.modes[i] in ACTIVE]
         self._may_share = len(self.rows) > 1 and max(self.follows, default=-1) < 0
 

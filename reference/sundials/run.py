@@ -372,7 +372,7 @@ class SundialsRun:
             events=tuple(self.machine.events),
             switches=tuple(self.discrete.switches),
             outcome=outcome, message=self._message(outcome), steps=self.scene.steps, wall_s=wall_s,
-            unique_until=self.machine.unique_until, counts=MappingProxyType(
+            unique_until=self.machine.unique_until, searched_until=self.machine.searched_until, counts=MappingProxyType(
                 {"rhs": self.scene.evaluations}
                 | ({"redundant": self.machine.redundant} if self.machine.redundant else {})
                 | self.machine.told

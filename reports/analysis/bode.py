@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from crossbody import cases
-from crossbody.cases import CaseUnsupported, Value
+from crossbody.cases import Value
 from crossbody.cases.mechanisms.soft import claims as closed
 from crossbody.cases.mechanisms.soft.scene import numbers
 from crossbody.reference.linear import LinearModel, linearise
@@ -100,9 +100,3 @@ def growths(poles_: pd.DataFrame) -> pd.DataFrame:
         rest = np.argsort(np.hypot(real, imag))[2:]
         rows.append({"mode": mode, "kstar": kstar, "growth": real[rest].max()})
     return pd.DataFrame(rows, columns=["mode", "kstar", "growth"])
-
-
-def check(name: str) -> None:
-    """Raise CaseUnsupported for a case without a frequency response here."""
-    if name != CASE:
-        raise CaseUnsupported(f"There is no frequency response of {name!r}; there is one of: {CASE}.")

@@ -69,9 +69,9 @@ def analyse(
     Pairs K=V are parameters to change, or where to look; locus is PARAM=a..b; without a folder
     nothing is written.
     """
-    check_answers("analyse")
     overrides, place = choice.parse_settings(pairs), parse_place(at)
     case = cases.load(name, variant, **overrides)
+    check_answers("analyse")
     case = rubbing(case) or case  # an equilibrium may rest on contacts that slide
     found = places(case, place)
     for text in dict.fromkeys(text for one in found for text in one.system.findings):
@@ -102,9 +102,8 @@ def analyse(
     return exit_code(engines["verdict"])
 
 
-def bode(name: str, pairs: Sequence[str], out: Path, command: str) -> int:
+def bode(pairs: Sequence[str], out: Path, command: str) -> int:
     """Frequency responses in the grasp, poles in every mode set; parameters k* are the figure's own."""
-    curves.check(name)
     parameters = choice.parse_settings(pairs)
     if "kstar" in parameters:
         raise InvalidValue(f"kstar is what the curves differ in: {', '.join(f'{k:g}' for k in curves.GAINS)}.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping, Sequence
 
 from joblib import Parallel, delayed
 
@@ -13,13 +14,17 @@ from crossbody.cases.defaults import limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging import stored
 from crossbody.reports.judging.run_verdicts import Entry, measured
-from crossbody.reports.judging.verdict import limit_for
-from crossbody.reports.measuring.truth import shortened
+from crossbody.reports.judging.verdict import ROUNDING, limit_for
+from crossbody.reports.measuring.truth import Truth, shortened
 from crossbody.reports.runs import choice, jobs
 
 NEAR = (0.7, 1.4)
 """Tolerances of the runs beside a stored one, over its own: how far one run of adaptive steps is
 off is chance, and moves tenfold with the last digit; the largest of three does not."""
+NUDGED = 1.0 + 1e-9
+"""Times a fixed step: another grid by less than any number of its run should tell."""
+UNSTEADY = 0.01
+"""Part of a number by which it moves then if rounding decides it, as it does the order of touches."""
 
 
 def _measured(name: str, variant: str) -> list[stored.Laid]:
@@ -39,8 +44,35 @@ def _measured(name: str, variant: str) -> list[stored.Laid]:
             for one in (one for one in beside.entries if one.run):
                 key = (one.engine, one.profile)
                 found[key] = _largest(found[key], measured(case, one, result.truth), _known(case, one))
-    end = shortened(result.truth).trusted
-    return [stored.laid(case, one, found[one.engine, one.profile], end) for one in runs]
+    end, unsteady = shortened(result.truth).trusted, _unsteady(case, wanted, result.truth, runs, found)
+    return [
+        stored.laid(case, one, found[one.engine, one.profile], end, unsteady.get((one.engine, one.profile)))
+        for one in runs
+    ]
+
+
+def _unsteady(
+    case: Case, wanted: Sequence[choice.Pick], truth: Truth, runs: Sequence[Entry],
+    found: Mapping[tuple[str, str], stored.Deviations],
+) -> dict[tuple[str, str], list[str]]:  # fmt: skip
+    """Metrics of engines that step on a fixed grid, which another one by a change of rounding's size moves."""
+    steps = {
+        (one.engine, one.profile): NUDGED * float(one.settings["dt"])
+        for one in runs if "dt" in one.settings and "rtol" not in one.settings
+    }  # fmt: skip
+    asked = {f"{engine}:{profile}.dt": dt for (engine, profile), dt in steps.items()}
+    picks = [pick for pick in wanted if (pick.engine, pick.profile) in steps]
+    beside = jobs.run_case(case, picks, None, print, asked, truth=truth, refine=False) if picks else None
+    entries = {(one.engine, one.profile): one for one in (beside.entries if beside else ()) if one.run}
+    moved = {key: measured(case, entries[key], truth) if key in entries else {} for key in steps}
+    return {key: [name for name, value in found[key].items() if _apart(value, moved[key].get(name))] for key in steps}
+
+
+def _apart(one: float, other: float | None) -> bool:
+    """Whether a number is another one, or gone."""
+    if other is None or math.isfinite(one) != math.isfinite(other):
+        return True
+    return math.isfinite(one) and abs(one - other) > UNSTEADY * one + ROUNDING
 
 
 def _known(case: Case, entry: Entry) -> frozenset[str]:

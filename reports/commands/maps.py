@@ -9,7 +9,7 @@ import click
 
 from crossbody import engines
 from crossbody.reports import layout, voice
-from crossbody.reports.commands.shared import print_rows, publish, where
+from crossbody.reports.commands.shared import check_answers, print_rows, publish, where
 from crossbody.reports.maps import gapmap, stability
 from crossbody.reports.runs import choice, output
 from crossbody.reports.runs.provenance import provenance
@@ -19,6 +19,7 @@ GAP_MAP = ("reference:compiled", "mujoco", "pinocchio")
 
 def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path, command: str) -> int:
     """Run the sliders over all gaps; writes the table and the page."""
+    check_answers("gapmap")
     picks = choice.picks(wanted or [name for name in GAP_MAP if name.partition(":")[0] in engines.names()])
     output.check(out, "gapmap")
     with voice.progress(len(counts) * len(gapmap.lines(picks))) as tell:

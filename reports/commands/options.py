@@ -210,13 +210,13 @@ def parameters(command: _Work) -> _Work:
     """Options that give parameters of the case; the command takes all of them as `pairs`, texts K=V."""
 
     @wraps(command)
-    def gathered(
-        *given: Any, pairs: tuple[str, ...], law: str | None, push: tuple[tuple[Any, ...], ...], **asked: Any
-    ) -> int:
+    def gathered(*given: Any, pairs: tuple[str, ...], law: str | None, **asked: Any) -> int:
         named = {name: asked.pop(name) for name in ("t_end", "ctrl", "control", "tick", "without")}
         if named["tick"] is not None and named["control"] is None and not any(p.startswith("control=") for p in pairs):
             raise click.UsageError("--tick is the time between calls of a controller, but no --control is given.")
-        named |= {"push": "; ".join(" ".join(map(str, one)) for one in push) or None, "rank": asked.pop("rank")}
+        named["rank"] = asked.pop("rank")
+        for name in ("push", "start", "rate"):
+            named[name] = "; ".join(" ".join(map(str, one)) for one in asked.pop(name)) or None
         own = [f"{name}={value}" for name, value in named.items() if value is not None]
         return command(*given, pairs=(*pairs, *own, *filter(None, (law or "").split(","))), **asked)
 
@@ -236,6 +236,14 @@ def parameters(command: _Work) -> _Work:
         click.option(
             "--push", type=(str, *(float,) * 5), multiple=True, metavar="BODY FX FY FZ T0 T1",
             help="Robot file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
+        ),
+        click.option(
+            "--start", type=(str, float), multiple=True, metavar="NAME VALUE",
+            help="Robot file: a coordinate at the start, m or rad, by its joint's name; repeatable.",
+        ),
+        click.option(
+            "--rate", type=(str, float), multiple=True, metavar="NAME VALUE",
+            help="Robot file: a velocity at the start, m/s or rad/s; repeatable.",
         ),
         click.option("--without", metavar="PARTS", help="Robot file: parts to leave out in every engine."),
         click.option("--rank", type=COUNT, metavar="N", help="Robot file: number of independent rows of its loops."),

@@ -88,12 +88,12 @@ def run_replay(ask: Ask, kind: str, wanted: Sequence[str], out: Path, command: s
     """Replay a log, "forward" or "closed_loop", on engines or all usual ones, and write the report."""
     hw.models.load(ask.model)
     output.check(out, "replay")
-    check_answers("replay")
     given = comparison.parse(ask.limits)
     engines = [engine for engine in wanted or DEFAULT_ENGINES if not _ended(ask.model, engine)]
     if not engines:
         raise CaseUnsupported(f"None of the requested engines returned: {'; '.join(watch.all_lost())}.")
     log = ask.log()
+    check_answers("replay")
     with Parts(out, command, _identity(ask, log, kind, wanted)) as parts, voice.progress(len(engines)) as bar:
 
         def tell(text: str) -> None:
@@ -138,9 +138,9 @@ def run_identify(
     """
     model = hw.models.load(ask.model)
     output.check(out, "identify")
-    check_answers("replay")
     asked = comparison.parse(ask.limits)
     log, given = ask.log(), choice.parse_settings(ask.pairs)
+    check_answers("replay")
     label = f"{ask.model} identified from {ask.path}"
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label}: {why}")

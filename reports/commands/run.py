@@ -15,7 +15,7 @@ from crossbody.engines.equations import answering, equations_of, has_equations
 from crossbody.reference.compiling import count
 from crossbody.reports import layout, voice
 from crossbody.reports.commands import planned, repeated
-from crossbody.reports.commands.run_shown import counted, show, show_time
+from crossbody.reports.commands.run_shown import counted, show, show_time, show_unselected
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging import known
 from crossbody.reports.judging.audit import SEED
@@ -89,6 +89,7 @@ def run(
     if untold is not None:
         raise untold
     if not voice.silent():
+        show_unselected(wanted)
         show_time([*clock, perf_counter()], times, count.seconds - compiled)
     where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()

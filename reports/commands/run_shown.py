@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import click
 
+from crossbody import engines
 from crossbody.reports import layout, voice
 from crossbody.reports.commands import printed
 from crossbody.reports.judging.parts import PARTS, part_of
@@ -16,6 +17,7 @@ from crossbody.reports.judging.told import EngineRun, beyond, runs_of, sentence
 from crossbody.reports.judging.verdict import Regression, Row, Word
 from crossbody.reports.layout import NO_BREAK, unit_text
 from crossbody.reports.pages.results import Times
+from crossbody.reports.runs.choice import DEFAULT_ENGINES
 
 MANY = 4  # cases that are named of those that an engine could not run
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
@@ -56,6 +58,13 @@ def show(rows: Sequence[Row], times: Times) -> None:
         if i >= len(above) or not voice.quiet():
             click.echo(text + "\n" * (i < len(above) - 1))
     printed.check(texts, rows, times, layout.columns())
+
+
+def show_unselected(wanted: Sequence[str]) -> None:
+    """Print, where no engine was asked for by name, which others there are."""
+    others = [name for name in engines.names() if name not in DEFAULT_ENGINES]
+    if others and not wanted:
+        click.echo(layout.told(f"Not selected: {', '.join(others)}; -e NAME runs one, if it is installed."))
 
 
 def show_time(clock: Sequence[float], times: Times, compiling: float = 0.0) -> None:
@@ -145,11 +154,10 @@ def _wrong(run: EngineRun, row: Row) -> str:
 def _lost(run: EngineRun, row: Row) -> str:
     if math.isnan(row["band"]):
         return f"worse than the stored run: {run.label} {row['metric']}. {row['why']}"
-    expected = 0.0 if math.isnan(row["expected"]) else row["expected"]
-    value = (
-        f"{abs(row['value'] - expected):.4g}{unit_text(row['unit'])} from the claimed number, band {row['band']:.3g}"
-    )
-    return f"worse than the stored run: {run.label} {run.who} {row['metric']} {value}"
+    off = abs(row["value"] - (0.0 if math.isnan(row["expected"]) else row["expected"]))
+    value = f"{off:.4g}{unit_text(row['unit'])} from the claimed number, band {row['band']:.3g}"
+    what = "worse than" if not off <= row["band"] else "not the number that this version of the engine gave in"
+    return f"{what} the stored run: {run.label} {run.who} {row['metric']} {value}"
 
 
 def _absent(runs: Sequence[EngineRun]) -> list[str]:

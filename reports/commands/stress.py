@@ -14,7 +14,7 @@ import pandas as pd
 
 from crossbody.cases import InvalidValue, OutputError
 from crossbody.reports import layout, suites, voice
-from crossbody.reports.commands.shared import print_rows, publish, where
+from crossbody.reports.commands.shared import check_answers, print_rows, publish, where
 from crossbody.reports.judging.verdict import exit_code
 from crossbody.reports.runs import choice, watch
 from crossbody.reports.runs.provenance import provenance
@@ -47,6 +47,7 @@ class Ask:
 
 def stress(ask: Ask, out: Path, command: str) -> int:
     """Run suites, or what is left of them; the exit code."""
+    check_answers("stress")
     specs = plan(ask)
     chunk = min(max(len(specs) // CHUNKS, LEAST), MOST)
     if ask.resume and not (out / SWEEP).is_file():

@@ -73,7 +73,7 @@ def judged(
         *rows,
         *truth_row(case, truth, command),
         *_idle(case, rows, command),
-        *blind(case, trusted, command),
+        *blind(case, trusted, command, [entry.engine for entry in entries if entry.run is not None]),
     ]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,8 @@ from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.run_verdicts import REACHED, WIDEST, Entry, Judge, audited, finished, value_of, verdicts
 from crossbody.reports.judging.stored import changed, compared_until
-from crossbody.reports.judging.truth_row import of_truth, truth_row
+from crossbody.reports.judging.truth import PARTED
+from crossbody.reports.judging.truth_row import BESIDE_MOTION, of_truth, truth_row
 from crossbody.reports.judging.verdict import Regression, Verdict, Word, exit_code, limit_for
 from crossbody.reports.measuring.truth import Truth, before
 
@@ -28,7 +29,7 @@ UNLIMITED = ("creep_speed", "lam_error", "lam_impulse")
 """Metrics that controls look at, and that are limited in some cases only."""
 
 
-def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
+def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> Iterator[Verdict]:
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
     from crossbody.reports.judging import known
     from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
@@ -53,7 +54,7 @@ def blind(case: Case, truth: Truth, command: str) -> Iterator[Verdict]:
         )
 
     for name, value, (least, most), fault in (
-        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(file=bool(case.file)),
+        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(file=bool(case.file), ran=ran),
     ):  # fmt: skip
         if least <= value <= most:
             why = f"A control passes: {fault} is no number outside."
@@ -98,9 +99,12 @@ def _unsaid_of_sources(judge_: Judge) -> Iterator[tuple[str, str]]:
         apart = {"position": 0.0, name: 2.0 * truth.allowed * unit}
         if any(row.verdict != Word.OUTSIDE for row in truth_row(judge_.case, replace(truth, agreement=apart), "")):
             yield "truth", f"sources whose {name} differ twice as much as they may are said to agree"
-    other = replace(truth, agreement={"position": 0.0, "modes": 1.0})
-    if any(row.verdict != Word.OUTSIDE for row in truth_row(judge_.case, other, "")):
-        yield "truth", "sources of which one has a row in another mode are said to agree"
+    others = {"modes": (1.0, "of which one has a row in another mode")}
+    others |= {name: (2.0 * PARTED, f"of which one is off by {name}") for name in BESIDE_MOTION}
+    for name, (off, which) in others.items():
+        other = replace(truth, agreement={"position": 0.0, name: off})
+        if any(row.verdict != Word.OUTSIDE for row in truth_row(judge_.case, other, "")):
+            yield "truth", f"sources {which} are said to agree"
 
 
 def _unsaid_of_audits(judge_: Judge) -> Iterator[tuple[str, str]]:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
+from crossbody import engines
 from crossbody.cases import installed
 from crossbody.cases.errors import OwnFault
 from crossbody.cases.sources import readable
@@ -26,13 +27,16 @@ KINDS = (
     "judging.known_answers", "judging.known_sides", "judging.known_sources", "judging.known_growth",
     "judging.known_parts", "judging.known_steps", "judging.known_tables", "judging.known_equations",
     "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
-    "judging.known_verdicts",
+    "judging.known_verdicts", "judging.known_audits",
 )  # fmt: skip
 OF_FILES = ("judging.known_files",)
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
+OF_ENGINES = "judging.known_engines"
+"""Of an engine that runs, beside: others are not imported for it."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay",), "bench": ("bench.known_bench",), "analyse": ("analysis.known_analysis",),
-    "picture": ("pages.known_pictures",),
+    "replay": ("replay.known_replay", "replay.known_formats"), "bench": ("bench.known_bench",),
+    "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
+    "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps",),
 }  # fmt: skip
 """Of commands that judge no run: they ask before they say a number."""
 RUNS = "known_answers"
@@ -43,14 +47,18 @@ once = False
 """Whether what was right is believed: where a command has a process of its own, so that nobody replaced functions."""
 
 
-def wrong(*, file: bool = False) -> Iterator[Found]:
+def wrong(*, file: bool = False, ran: Iterable[str] = ()) -> Iterator[Found]:
     """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another.
 
-    Those of readers of files are asked where a file is run.
+    Args:
+        file: whether a file is run: then those of readers of files are asked too.
+        ran: engines that run: each of crossbody's own is asked for its answers.
     """
     yield from _once(RUNS, KINDS)
     if file:
         yield from _once(f"{RUNS}_files", OF_FILES)
+    for name in sorted(set(ran) & set(engines.REGISTRY.own())):
+        yield from _once(f"{RUNS}_{name}", (OF_ENGINES,), name)
 
 
 def check(command: str) -> None:
@@ -66,22 +74,22 @@ def check(command: str) -> None:
         raise OwnFault(f"No number can be trusted: {name} of {what} is {value:.9g}, but must be {must}.{more}")
 
 
-def _once(kept: str, names: tuple[str, ...]) -> tuple[Found, ...]:
-    """Return what is wrong of some modules, asked once for each version of the code."""
+def _once(kept: str, names: tuple[str, ...], engine: str = "") -> tuple[Found, ...]:
+    """Return what is wrong of some modules, of an engine where they ask one, once for each version of the code."""
     store = code_store.current() if once and readable() else None
-    name = "" if store is None else _name(kept)
+    name = "" if store is None else _name(kept, engine)
     if store is not None and store.has(name) and store.read(name) == RIGHT:
         return ()
-    found = tuple(_asked(names))
+    found = tuple(_asked(names, *(engine,) if engine else ()))
     if store is not None and not found:
         store.write(name, RIGHT)
     return found
 
 
-def _asked(names: tuple[str, ...] = KINDS) -> Iterator[Found]:
-    """Ask all of them."""
+def _asked(names: tuple[str, ...] = KINDS, *of: str) -> Iterator[Found]:
+    """Ask all of them, those of an engine by its name."""
     for kind in kinds(names):
-        yield from kind.wrong()
+        yield from kind.wrong(*of)
 
 
 def kinds(names: tuple[str, ...] = KINDS) -> tuple[ModuleType, ...]:
@@ -98,7 +106,7 @@ def _templates() -> str:
     return found.hexdigest()
 
 
-def _name(kept: str = RUNS) -> str:
+def _name(kept: str = RUNS, engine: str = "") -> str:
     """Return under which name it is kept that all were right: readable, then a digest of all that they depend on."""
     from crossbody.reference.cache import debugging, machine
 
@@ -110,5 +118,6 @@ def _name(kept: str = RUNS) -> str:
         installed.version("scipy"),
         str(debugging()),
         repr(sorted(installed.digests().items())),
+        repr(sorted(engines.load(engine).versions.items())) if engine else "",
     )
     return code_store.named(kept, *depends)

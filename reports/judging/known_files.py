@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,6 +23,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.start_of_file import start_of_file
 
 EXACT = 1e-9
 """What compilers leave of a number, of its size: they turn inertias into their axes and back."""
@@ -52,6 +54,11 @@ URDF = """<robot name="known"><link name="base"/>
 <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0.1 1" rpy=".2 -.4 .9"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="2" effort="50" velocity="9"/>
 <dynamics damping=".05" friction="0.2"/></joint></robot>"""
+STARTS = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0"/><geom size=".1"/></body></worldbody>
+<actuator><motor joint="rail"/></actuator>
+<keyframe><key name="one" qpos=".3" qvel="-2" ctrl=".7"/></keyframe></mujoco>"""
+OTHER = 1e-6
+"""By which another start is off."""
 Found = tuple[str, float, Range, str]
 Asked = tuple[str, Any, Any]
 
@@ -61,7 +68,7 @@ def wrong() -> tuple[Found, ...]:
     """Return what was read, as it is, least and most, and of which file; nothing where no compiler is installed."""
     return tuple(
         (f"reader of {kind.__name__.strip('_')}", *one, what)
-        for kind in ((_mjcf, _urdf) if find_spec("mujoco") else ())
+        for kind in ((_mjcf, _urdf, _start) if find_spec("mujoco") else ())
         for what, mine, right in rows_of(kind, lambda why: (why, np.nan, ""))  # what cannot be read has no numbers
         if (one := _off(mine, right))
     )
@@ -164,3 +171,20 @@ def _urdf() -> Iterator[Asked]:
     yield "turn of arm", 4.0 * w * w - 1.0, trace
     turns = np.array([stands[2, 1] - stands[1, 2], stands[0, 2] - stands[2, 0], stands[1, 0] - stands[0, 1]])
     yield "axis of the turn of arm", 4.0 * w * np.array(along), turns
+
+
+def _start() -> Iterator[Asked]:
+    """Yield how many rows about the start of a file are wrong: of its own start none, of others one each."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "known.xml"
+        path.write_text(STARTS, encoding="utf-8")
+        case = cases.load(str(path), "one")
+        assert case.inputs is not None
+        others = {
+            "its own": case, "another place": replace(case, q0=case.q0 + OTHER),
+            "another speed": replace(case, v0=case.v0 - OTHER),
+            "another control": replace(case, inputs=replace(case.inputs, values=case.inputs.values + OTHER)),
+        }  # fmt: skip
+        for what, one in others.items():
+            wrong_ = sum(not row.ok for row in start_of_file(one))
+            yield f"rows of a start that is {what}", wrong_, int(one is not case)

@@ -10,14 +10,16 @@ from collections.abc import Iterator
 from functools import cache
 
 from crossbody.cases import Claim, Limit, Tier
+from crossbody.reports.judging import verdict
 from crossbody.reports.judging.planted import Range
-from crossbody.reports.judging.verdict import Word, as_stored, band, judge
+from crossbody.reports.judging.verdict import Word, as_stored, band, judge, regression
 
 BESIDE = 1e-3
 """Part of a bound by which a number is beside it."""
 LIMIT, STORED, EXPECTED = 1e-6, 3e-3, 4.0
-FACTOR, BAND, ROUNDING, NOUGHT = 2.0, 10.0, 1e-12, 1e-6
-"""As docs/explanation/verdicts.md has them: of known sizes, of bands, of what differs between machines, of no limit."""
+FACTOR, AGAIN, BAND, ROUNDING, NOUGHT = 2.0, 1.05, 10.0, 1e-12, 1e-6
+"""As docs/explanation/verdicts.md has them: of known sizes, also of the same version's on the same grid, of bands, of
+what differs between machines, of no limit."""
 Found = tuple[str, float, Range, str]
 Asked = tuple[str, str, str]
 
@@ -25,7 +27,7 @@ Asked = tuple[str, str, str]
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return verdict, number, least and most, and of what, where another word is said or another band is kept."""
-    return (*_words(), *_bands())
+    return (*_words(), *_bands(), *_regressions())
 
 
 def _sides(bound: float, below: Word, above: Word) -> Iterator[tuple[float, Word]]:
@@ -58,6 +60,12 @@ def _words() -> Iterator[Found]:
         yield from _said("a claim", EXPECTED + off, word, judge(EXPECTED + off, plain, claim, None)[0])
     for value, word in ((FACTOR * STORED * 1.01, Word.OUTSIDE), (FACTOR * STORED * 0.99, Word.EXPECTED)):
         yield from _said("a stored number without a limit", value, word, as_stored(value, known, STORED)[0])
+    for bound, inside, sign in ((AGAIN, Word.EXPECTED, 1.0), (1.0 / AGAIN, Word.EXPECTED, -1.0)):
+        for off, word in ((-sign * BESIDE, inside), (sign * BESIDE, Word.OUTSIDE)):
+            value = bound * STORED * (1.0 + off)
+            yield from _said(
+                "a number that is given again", value, word, judge(value, known, None, STORED, verdict.AGAIN)[0]
+            )
     small = FACTOR * NOUGHT * (1.0 - BESIDE)
     yield from _said("a stored number that is none", 10.0 * small, Word.INFO, as_stored(10.0 * small, known, small)[0])
 
@@ -82,3 +90,24 @@ def _bands() -> Iterator[Found]:
             yield "band", found, (wanted, wanted), what
     if not math.isnan(band(None, plain)) or not math.isnan(band(math.nan, plain)):
         yield "band", band(None, plain), (math.nan, math.nan), "nothing stored"
+
+
+def _regressions() -> Iterator[Found]:
+    """Yield deviations beside a stored one that are said to have stayed, or to have left it, where they have not."""
+    near, far, large = (1.0 + 0.9 * (AGAIN - 1.0)) * STORED, (1.0 + 1.1 * (AGAIN - 1.0)) * STORED, 1.01 * BAND * STORED
+    asked = (
+        ("given again", regression(near, BAND * STORED, STORED, verdict.AGAIN), "kept"),
+        ("another than the stored one", regression(far, BAND * STORED, STORED, verdict.AGAIN), "lost"),
+        ("half of the stored one", regression(0.5 * STORED, BAND * STORED, STORED, verdict.AGAIN), "lost"),
+        ("in its band", regression(far, BAND * STORED, STORED, FACTOR), "kept"),
+        ("beyond its band", regression(large, BAND * STORED, STORED, FACTOR), "lost"),
+        ("nowhere stored", regression(STORED, math.nan, None, FACTOR), ""),
+    )
+    for what, found, wanted in asked:
+        if found != wanted:
+            yield (
+                "regression",
+                STORED,
+                (math.nan, math.nan),
+                f"a number {what}: it is said to be {found!r}, not {wanted!r},",
+            )

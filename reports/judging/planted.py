@@ -336,7 +336,8 @@ def _laws(plain: Plain, least: float) -> Iterator[Control]:
         other = replace(few, lam=np.where(changes, times, 1.0) * few.lam)
         yield Control(fault=f"multipliers {said}", run=other, sees={"law_residual": twice}, plain=few)
         one = _with(few, "lam", (int(at[0]), int(at[1])), (1.0 + sign * MUCH) * few.lam[at])
-        seen = (TENTH * MUCH, ROUGH * MUCH)
+        pushes = float(np.max(np.abs(few.lam[changes]), initial=0.0))  # by which friction of what slides is measured
+        seen = (TENTH * MUCH, ROUGH * MUCH * max(1.0, abs(float(few.lam[at])) / (pushes or 1.0)))
         yield Control(
             fault=f"the largest multiplier {sign * MUCH:g} off at one sample", run=one, sees={"law_residual": seen},
             plain=few,

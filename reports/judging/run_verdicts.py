@@ -20,12 +20,23 @@ from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
-from crossbody.reports.judging.stored import Deviations, changed, defaults, deviations, differing, lacking, words
+from crossbody.reports.judging.steps_taken import miscounted
+from crossbody.reports.judging.stored import (
+    Deviations,
+    changed,
+    defaults,
+    deviations,
+    differing,
+    lacking,
+    repeated,
+    words,
+)
 from crossbody.reports.judging.verdict import (
+    AGAIN,
+    FACTOR,
     IDENTITIES,
     LACKS,
     ROUNDING,
-    Regression,
     Verdict,
     Word,
     as_stored,
@@ -34,6 +45,7 @@ from crossbody.reports.judging.verdict import (
     explained,
     judge,
     limit_for,
+    regression,
 )
 from crossbody.reports.measuring.truth import Truth, shortened
 
@@ -150,6 +162,7 @@ class Judge:
         self.claims: Mapping[str, Claim] = {claim.metric: claim for claim in case.claims}
         self.limits = limits_of(case)
         self.stored: Deviations = deviations(case, entry, truth.trusted)
+        self.repeated = repeated(case, entry) if self.stored else frozenset()
         self.looser, self.longer = looser(case, entry), longer(case)
         self.command = f"{command} {entry.options}"
 
@@ -209,25 +222,25 @@ class Judge:
     def judged(self, metric: str, value: float, unit: str, against: Truth, compared: float) -> Verdict:
         """One number: its word by physics and method, and by the stored run."""
         claim, limit, stored = self.claims.get(metric), self.limit(metric), self.stored.get(metric)
-        word, why = judge(value, limit, claim, stored)
+        factor = AGAIN if metric in self.repeated else FACTOR
+        word, why = judge(value, limit, claim, stored, factor)
         if math.isfinite(value):
             word, why = self.told(metric, word, why)
         if word is Word.INFO and limit is None:
             shown = limit_for(self.limits, "*", self.entry.engine, self.entry.profile)
-            word, why = as_stored(value, shown, stored)
+            word, why = as_stored(value, shown, stored, factor)
         known = self.case.chaos or self.truth.horizon
         until = 1.0 if known is None else min(1.0, known.until / self.case.t_end)
         if compared < FLOOR * until and (word is Word.WITHIN or (word is Word.EXPECTED and stored is None)):
             word, why = Word.INFO, f"Compared over {compared:.2%} of the horizon only: {against.source}"
         most = band(stored, limit, claim)
-        kept = Regression.KEPT if deviation(value, claim) <= most else Regression.LOST
         return self.row(
             metric, value, unit, word,
             why or self.untold.get(metric, "") or (against.source if against is not self.truth else ""),
             expected=math.nan if claim is None else claim.expected,
             limit=limit.value if limit else math.nan if claim is None else 0.0,
             tier=against.tier.value if claim is None else claim.tier.value,
-            compared=compared, band=most, regression="" if math.isnan(most) else kept,
+            compared=compared, band=most, regression=regression(deviation(value, claim), most, stored, factor),
         )  # fmt: skip
 
     def missing(self, metric: str, unit: str, why: str, needs: str) -> Verdict:
@@ -261,8 +274,7 @@ def verdicts(
     if entry.run is None:
         return [judge_.row("run", math.nan, "", Word.SKIPPED, entry.skipped)]
     rows = [finished(judge_, entry.run), *_defaults(judge_)]
-    for value, why in () if entry.clock is None else mistimed(entry.clock, entry.run, entry.took_s):
-        rows.append(judge_.row("time (control)", value, "s", Word.OUTSIDE, why, tier=""))
+    rows += _outside_of_clocks(judge_, entry)
     if entry.audit:
         rows.append(audited(judge_))
         if rows[-1].verdict == Word.OUTSIDE:
@@ -273,6 +285,16 @@ def verdicts(
     rows += _measured(judge_, run, truth)
     rows += _split(judge_, {row.metric: row.value for row in rows})
     return [*rows, *_vanished(judge_, {row.metric for row in rows})]
+
+
+def _outside_of_clocks(judge_: Judge, entry: Entry) -> Iterator[Verdict]:
+    """Say which times and steps that a run reports are not those that were seen from outside."""
+    if entry.clock is None or entry.run is None:
+        return
+    for value, why in mistimed(entry.clock, entry.run, entry.took_s):
+        yield judge_.row("time (control)", value, "s", Word.OUTSIDE, why, tier="")
+    for value, wanted, why in miscounted(judge_.case, entry.settings, entry.clock.run):
+        yield judge_.row("steps (control)", value, "1", Word.OUTSIDE, why, expected=float(wanted), tier="")
 
 
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:

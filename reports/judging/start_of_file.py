@@ -31,7 +31,7 @@ def start_of_file(case: Case) -> tuple[AuditRow, ...]:
     if not case.file or case.scene is None:
         return ()
     key = _key(case)
-    return (*(_start(case, key) if key is not None else ()), *_pushes(case), *_table(case))
+    return (*(_start(case, key) if key is not None else ()), *_as_asked(case), *_pushes(case), *_table(case))
 
 
 def _key(case: Case) -> Mapping[str, str] | None:
@@ -66,16 +66,42 @@ def _start(case: Case, key: Mapping[str, str]) -> Iterator[AuditRow]:
     assert scene is not None
     q = _numbers(key.get("qpos"), 0)
     if len(q) == len(case.q0) and not p.get("assemble"):
+        q[[at for at, _ in _asked(case, "start")]] = [value for _, value in _asked(case, "start")]
         for at in case.quaternions:
             q[at : at + 4] /= float(np.sqrt(np.sum(q[at : at + 4] ** 2))) or 1.0
         yield _row("q of the file", case.q0, q)
     if not p.get("assemble"):
-        yield _row("v of the file", case.v0, _numbers(key.get("qvel"), len(case.v0)))
+        v = _numbers(key.get("qvel"), len(case.v0))
+        v[[at for at, _ in _asked(case, "rate")]] = [value for _, value in _asked(case, "rate")]
+        yield _row("v of the file", case.v0, v)
     if scene.activated:
         yield _row("activations of the file", case.act0, _numbers(key.get("act"), len(scene.activated)))
     if case.inputs is not None and scene.actuators and not (p.get("ctrl") or p.get("control")):
         held = case.inputs.values[:, : len(scene.actuators)]
         yield _row("controls of the file", held, np.tile(_numbers(key.get("ctrl"), held.shape[1]), (len(held), 1)))
+
+
+def _asked(case: Case, name: str) -> list[tuple[int, float]]:
+    """Return the places and values of the start that were asked for: those of a slide, a hinge or a place of a body."""
+    assert case.scene is not None
+    widths = {"free": (7, 6), "ball": (4, 3), "slide": (1, 1), "hinge": (1, 1)}
+    first, found, rate = 0, dict[str, int](), name == "rate"
+    for joint in case.scene.joints:
+        inside = ("x", "y", "z", *(("rx", "ry", "rz") if rate else ())) if joint.type == "free" else ()
+        inside = ("rx", "ry", "rz") if joint.type == "ball" and rate else inside
+        names = [f"{joint.name} {one}" for one in inside] or [joint.name]
+        found |= {one: first + k for k, one in enumerate(names)}
+        first += widths[joint.type][rate]
+    parts = [part.rsplit(maxsplit=1) for part in str(case.parameters.get(name, "")).split(";") if part.strip()]
+    return [(found[entry.strip()], float(value)) for entry, value in parts]
+
+
+def _as_asked(case: Case) -> Iterator[AuditRow]:
+    """Yield positions and velocities at the start that were asked for, and those of the case."""
+    for name, start in (("start", case.q0), ("rate", case.v0)):
+        if (asked := _asked(case, name)) and not case.parameters.get("assemble"):
+            at, wanted = zip(*asked, strict=True)
+            yield _row(f"{name} as asked", start[list(at)], np.array(wanted))
 
 
 def _numbers(text: str | None, count: int) -> Floats:

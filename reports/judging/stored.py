@@ -47,6 +47,27 @@ def deviations(case: Case, entry: Entry, trusted: float) -> Deviations:
     return {metric: float(value) for metric, value in run["deviations"].items()}
 
 
+def repeated(case: Case, entry: Entry) -> frozenset[str]:
+    """Metrics of which the same version of an engine must give the stored numbers again, as it steps on a fixed grid.
+
+    None of a comparison that ends before the horizon: where it ends decides what is the largest.
+    """
+    if not compared_until(case) >= case.t_end:
+        return frozenset()
+    run = _table()[case.label]["runs"].get(f"{entry.engine}:{entry.profile}", {})
+    steady = run.get("steady")
+    if steady is None or run["settings"] != words(entry.settings) or steady["versions"] != versions(entry.engine):
+        return frozenset()
+    return frozenset(run["deviations"]).difference(steady["but"])
+
+
+def versions(engine: str) -> str:
+    """Return the versions of an engine's packages in one line."""
+    from crossbody import engines
+
+    return ", ".join(f"{name} {version}" for name, version in sorted(engines.load(engine).versions.items()))
+
+
 def defaults(case: Case, entry: Entry) -> str:
     """Settings, in words, that the engine had itself in the stored run of the same parameters; or none."""
     if math.isnan(compared_until(case)):
@@ -107,7 +128,7 @@ def _limits(case: Case) -> str:
     return hashlib.sha256("\n".join([*limits, "", *claims]).encode()).hexdigest()[:12]
 
 
-def laid(case: Case, entry: Entry, found: Deviations, trusted: float) -> Laid:
+def laid(case: Case, entry: Entry, found: Deviations, trusted: float, unsteady: Iterable[str] | None = None) -> Laid:
     """Return what is stored of a run, as plain numbers that a process can send to another.
 
     Args:
@@ -115,6 +136,7 @@ def laid(case: Case, entry: Entry, found: Deviations, trusted: float) -> Laid:
         entry: its run.
         found: metric -> deviation.
         trusted: up to when it was compared, s.
+        unsteady: metrics that a change of rounding moves, of an engine that steps on a fixed grid; None of others.
     """
     head: dict[str, Any] = {"parameters": _digest(case), "limits": _limits(case)}
     head |= {"compared": float(f"{trusted:.3g}")} if trusted < case.t_end else {}
@@ -122,7 +144,9 @@ def laid(case: Case, entry: Entry, found: Deviations, trusted: float) -> Laid:
         metric: float(f"{value:.3g}") if math.isfinite(value) else str(value)  # JSON has no number for it
         for metric, value in sorted(found.items())
     }
-    run = {"settings": words(entry.settings), "deviations": numbers}
+    run: dict[str, Any] = {"settings": words(entry.settings), "deviations": numbers}
+    if unsteady is not None:
+        run["steady"] = {"versions": versions(entry.engine), "but": sorted(unsteady)}
     return case.label, head, f"{entry.engine}:{entry.profile}", run
 
 

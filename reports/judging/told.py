@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, SPLIT, part_of
-from crossbody.reports.judging.verdict import IDENTITIES, LACKS, Row, Word
+from crossbody.reports.judging.verdict import IDENTITIES, LACKS, UNMEASURED, Row, Word
 from crossbody.reports.layout import unit_text, valid
 from crossbody.reports.measuring.truth import TRUTH
 
 WRONG = (Word.CRASHED, Word.OUTSIDE)
-SHORT = re.compile(r"(?:Followed|Known up) to .*? s(?: of .*? s)?: (.*?)\.(?: |$)")
+SHORT = re.compile(r"(?:Followed|Known up) to (.*? s)(?: of .*? s)?: (.*?)\.(?: |$)")
 """What a truth's row says of a horizon shorter than was asked for, or a motion known in part."""
 FINISHED = "finished"  # the row that says whether a run came to its end
 _CLAUSE = re.compile(r"[:;,.](?:\s|$)")
@@ -131,16 +131,14 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         return "Nothing is judged, since no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: (run.failed is None, farthest(run.wrong[0])))
     right = [run for run in ran if not run.wrong]
-    known = [(run, row) for run in right if (row := run.deviates)]
-    loose = [(run, row) for run in right if not run.deviates and (row := run.unbounded)]
+    loose = [(run, row) for run in right if (row := run.unbounded)]
+    known = [(run, row) for run in right if not run.unbounded and (row := run.deviates)]
     text = _counted(len(right) - len(known) - len(loose), len(ran), [run.who for run, _ in known])
     if known:
         most = _largest(known)
         metric = most[0][1]["metric"]
         head = f"deviation of {metric}" if len(most) == 1 else f"deviations of {metric}, by unit"
-        causes = [_CLAUSE.split(row["why"])[0] for _, row in most]
-        each = [f"{_off(*one)}: {cause[:1].upper()}{cause[1:]}" for one, cause in zip(most, causes, strict=True)]
-        text += f" The largest {head}: {'; '.join(each)}."
+        text += f" The largest {head}: {'; '.join(_caused(most))}."
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     for said, of_truth in (("Off", False), ("In doubt", True)):
@@ -148,7 +146,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         text += f" {said}: {_named(some)}." if some else ""
     if loose:
         loose.sort(key=lambda one: -share(one[1]))
-        text += f" Beyond a limit for a known cause, and not judged: {_named([_off(*one) for one in loose])}."
+        text += f" Beyond a limit for a known cause, and not judged: {_named(_caused(loose))}."
     return f"{text}{_known_until(runs)}"
 
 
@@ -200,14 +198,15 @@ def _counted(within: int, ran: int, known: Sequence[str]) -> str:
 
 
 def _part(row: Row) -> str:
-    why = _why_short(row)
-    return f"{row['compared']:.2g} of the horizon" + (f" ({why})" if why else "")
+    said = SHORT.search(row["why"])
+    part = f"{row['compared']:.2g} of the horizon"
+    return f"{said[1]}, {part} ({said[2]})" if said else part
 
 
 def _why_short(row: Row) -> str:
     """Why a truth is known no further; nothing where its row does not say."""
     said = SHORT.search(row["why"])
-    return said[1] if said else ""
+    return said[2] if said else ""
 
 
 def _named(texts: Sequence[str]) -> str:
@@ -227,6 +226,15 @@ def _off(run: EngineRun, row: Row) -> str:
     if row.get("unit") == "%" and math.isfinite(times):  # a share of the whole is no multiple of what it may lack
         size = f"{row['value']:.3g} %, where {valid(row['expected'], row['limit'])} % is valid"
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
+
+
+def _caused(some: Sequence[tuple[EngineRun, Row]]) -> list[str]:
+    """Numbers beyond their limits; behind the last of those that are named with one cause, its first clause."""
+    causes = [_CLAUSE.split(row["why"].removeprefix(UNMEASURED))[0] for _, row in some]
+    return [
+        _off(run, row) + (f": {cause[:1].upper()}{cause[1:]}" if cause and (k == NAMED or cause != after) else "")
+        for k, ((run, row), cause, after) in enumerate(zip(some, causes, [*causes[1:], ""], strict=True), 1)
+    ]
 
 
 def _blamed(run: EngineRun, metric: str) -> str:

@@ -417,6 +417,19 @@ def agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
     found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
     if truth.tier is Tier.C and not case.general:  # of a scene, rows that share a load may switch in any order
         found["modes"] = _other_modes(truth, second, case)
+        found |= _accounts(truth, second, case)
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def _accounts(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
+    """Return how far the account of energy of another motion is off, by itself and row by row, and its impulses.
+
+    What it moves like says nothing of these: they are recorded beside.
+    """
+    from crossbody.reports import metrics
+
+    by = (*(("energy_integrator", "contact_work") if second.ledger is not None else ()), "lam_impulse_path")
+    found = {name: metrics.load(name).measure(truth, second, case) for name in by}
     return {name: value for name, value in found.items() if value is not None}
 
 

@@ -7,8 +7,12 @@ from typing import Any
 
 from crossbody.cases import Case
 from crossbody.reports.judging.stored import SAME_END, compared_until
+from crossbody.reports.judging.truth import PARTED
 from crossbody.reports.judging.verdict import Regression, Verdict, Word
 from crossbody.reports.measuring.truth import TRUTH, Truth, shortened
+
+BESIDE_MOTION = ("energy_integrator", "contact_work", "lam_impulse_path")
+"""Of a second source, what it records beside its motion: that this is right its motion does not tell."""
 
 
 def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
@@ -22,14 +26,17 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     until = case.t_end if known is None else min(known.until, case.t_end)
     value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
     short, other = truth.trusted < until, int(truth.agreement.get("modes", 0.0))
+    beside = {name: off for name in BESIDE_MOTION if not (off := truth.agreement.get(name, 0.0)) <= PARTED}
     told = [] if known is None else [f"Known up to {until:.4g} s: {known.why}."]
     told.append(f"{truth.source}.")
     if many := truth.trajectory.counts.get("not_searched", 0):
         told.append(
-            f"At {many} instant{'s' * (many > 1)} too many contacts could change to search for a second motion."
+            f"At {many} instant{'s' * (many > 1)}, from {truth.trajectory.searched_until:.4g} s on, "
+            "too many contacts could change to search for a second motion."
         )
     if other:
         told.append(f"At {other} samples its two sources have rows in other modes.")
+    told += [f"The {name} of its second source is {off:.1e}, beyond {PARTED:g}." for name, off in beside.items()]
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
     if truth.part < 1.0:
@@ -40,7 +47,7 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     return [Verdict(
         case=case.name, variant=case.variant, engine=TRUTH, profile="", metric=TRUTH, value=value, unit="1",
         limit=truth.allowed, tier=truth.tier.value, why=" ".join(told), command=command,
-        verdict=Word.WITHIN if value <= truth.allowed and not short and not other else Word.OUTSIDE,
+        verdict=Word.WITHIN if value <= truth.allowed and not (short or other or beside) else Word.OUTSIDE,
         regression=Regression.LOST if lost else "",
         compared=truth.part * min(truth.trusted / case.t_end, 1.0),
     )]  # fmt: skip

@@ -12,6 +12,8 @@ from crossbody.cases import Claim, Limit
 
 FACTOR = 2.0
 """A known property takes an engine between a FACTOR-th of what a stored run gave and FACTOR times it."""
+AGAIN = 1.05
+"""The same where the same version of an engine steps on the same grid: all but rounding is as it was."""
 BAND = 10.0
 """A number that was right may become so many times what a stored run gave before it counts as lost."""
 NOUGHT = 1e-6
@@ -20,6 +22,8 @@ ROUNDING = 1e-12
 """Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
 LACKS = "The run lacks this number, which the truth has."
+UNMEASURED = "Known, but its size has not been measured here: "
+"""How the reason of a number begins that is beyond its limit, nobody knows how far it may be."""
 IDENTITIES = frozenset(
     {
         "start_error",
@@ -130,21 +134,24 @@ def deviation(value: float, claim: Claim | None) -> float:
     return abs(value - (0.0 if claim is None else claim.expected))
 
 
-def explained(limit: Limit, stored: float | None) -> tuple[float, float] | None:
+def explained(limit: Limit, stored: float | None, factor: float = FACTOR) -> tuple[float, float] | None:
     """How far a known property takes an engine, at least and at most; None where nobody has measured it.
 
     Args:
         limit: with the property.
         stored: deviation of a stored run with the same parameters and settings; None where there is none.
+        factor: between the two, either way.
     """
     if limit.known_least > 0.0:
         return limit.known_least, limit.known_size
     if stored is not None:
-        return stored / FACTOR, stored * FACTOR
+        return stored / factor, stored * factor
     return (0.0, limit.known_size) if math.isfinite(limit.known_size) else None
 
 
-def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float | None = None) -> tuple[Word, str]:
+def judge(
+    value: float, limit: Limit | None, claim: Claim | None, stored: float | None = None, factor: float = FACTOR
+) -> tuple[Word, str]:
     """The word and the reason for one number.
 
     A claim without a limit must come out exactly. What is not finite is outside, even where
@@ -156,6 +163,7 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
         limit: what is allowed; None for nothing, or where nothing is judged.
         claim: what must come out; None for 0.
         stored: deviation of a stored run with the same parameters and settings; None where there is none.
+        factor: how many times it a known property may take the run, either way.
     """
     if not math.isfinite(value):
         return Word.OUTSIDE, "The value is not finite."
@@ -166,30 +174,31 @@ def judge(value: float, limit: Limit | None, claim: Claim | None, stored: float 
     why = "" if limit is None else limit.why
     off = deviation(value, claim)
     known = limit is not None and limit.known != ""
-    sizes = explained(limit, stored) if limit is not None and known else None
+    sizes = explained(limit, stored, factor) if limit is not None and known else None
     if off <= allowed and (sizes is None or sizes[0] <= allowed):
         return Word.WITHIN, (said + why).strip()
     if limit is None or not known:
         return Word.OUTSIDE, (said + why).strip()
     if sizes is None:
-        return Word.INFO, f"Known, but its size has not been measured here: {limit.known}"
+        return Word.INFO, f"{UNMEASURED}{limit.known}"
     least, most = sizes
     if least <= off <= most:
         return Word.EXPECTED, limit.known
     return Word.OUTSIDE, f"{said}A known property explains {least:.3g} to {most:.3g}: {limit.known}"
 
 
-def as_stored(value: float, shown: Limit | None, stored: float | None) -> tuple[Word, str]:
+def as_stored(value: float, shown: Limit | None, stored: float | None, factor: float = FACTOR) -> tuple[Word, str]:
     """The word for a number that nothing limits: that of its size, where a property is shown in any metric.
 
     Args:
         value: the number, finite.
         shown: limit with the property; None where an engine has none that is.
         stored: the number of a stored run with the same parameters and settings; None where there is none.
+        factor: as for `judge`.
     """
     if shown is None or stored is None or not stored > FACTOR * NOUGHT:
         return Word.INFO, ""
-    return judge(value, replace(shown, value=NOUGHT, known_least=0.0), None, stored)
+    return judge(value, replace(shown, value=NOUGHT, known_least=0.0), None, stored, factor)
 
 
 def band(stored: float | None, limit: Limit | None, claim: Claim | None = None) -> float:
@@ -202,6 +211,21 @@ def band(stored: float | None, limit: Limit | None, claim: Claim | None = None) 
     exact = claim is not None if limit is None else limit.value == 0.0
     size = 1.0 if claim is None else max(1.0, abs(claim.expected))
     return BAND * stored if exact else max(BAND * stored, ROUNDING * size)
+
+
+def regression(value: float, most: float, stored: float | None, factor: float) -> str:
+    """What is said of a deviation beside a stored one; nothing without.
+
+    Args:
+        value: the deviation.
+        most: its band, NaN without a stored run.
+        stored: the deviation of the stored run.
+        factor: below FACTOR it must be the stored one again, but for this.
+    """
+    if stored is None or math.isnan(most):
+        return ""
+    moved = factor < FACTOR and abs(value - stored) > (factor - 1.0) * stored + NOUGHT
+    return Regression.LOST if moved or not value <= most else Regression.KEPT
 
 
 def exit_code(words: Iterable[str], regressions: Iterable[str] = ()) -> int:

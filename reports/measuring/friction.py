@@ -97,10 +97,16 @@ def _pairs(case: Case, count: int) -> NDArray[np.intp]:
 
 
 def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats, Floats]:
-    """Return where slip has a direction (n, m), and speeds and forces (n, m), m/s and N."""
+    """Return where slip has a direction (n, m), and speeds and forces (n, m), m/s and N.
+
+    None has one where all of it is rounding of what moves and presses: of two places that open at one instant the one
+    that opens behind the other has no mode but SLIP there.
+    """
     speed, force = np.linalg.norm(found.slip, axis=-1), np.linalg.norm(found.force, axis=-1)
-    slides = (run.mode[:, found.rows] == Mode.SLIP) & (speed > SLOW * speed.max()) & (force > SLOW * force.max())
-    return slides, speed, force
+    fastest, most = float(np.max(np.abs(run.v), initial=0.0)), float(np.max(found.mu * found.normal, initial=0.0))
+    quick = speed > max(SLOW * float(speed.max()), BOUND * fastest)
+    firm = force > max(SLOW * float(force.max()), BOUND * most)
+    return (run.mode[:, found.rows] == Mode.SLIP) & quick & firm, speed, force
 
 
 def off_bound(run: Trajectory, case: Case) -> float:

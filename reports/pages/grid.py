@@ -17,7 +17,7 @@ from crossbody.reports.pages.html import BEYOND, number
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
-RANKED = (*WORST[:-1], Word.INFO.value, Word.WITHIN.value)
+RANKED = (*WORST[:2], Word.INFO.value, *WORST[2:])
 """Words of runs, the worst first: one that is not judged is beyond some limit for a known cause."""
 FARTHEST, NEAREST = 12, 6
 """Decades that are told apart beyond a limit, and within it."""
@@ -98,17 +98,16 @@ def names(rows: Iterable[Row]) -> list[str]:
 def worst(rows: Sequence[Row]) -> tuple[str, str]:
     """The worst word of some rows, and how many of how many judged have it.
 
-    What is within its limits beside numbers beyond theirs that are not judged, is not judged itself.
+    What is not outside, beside numbers beyond their limits that are not judged, is not judged itself.
     """
     counts = Counter(row["verdict"] for row in rows)
     total = sum(counts[word] for word in WORST)
     word = next((word for word in WORST if counts[word]), Word.SKIPPED.value if counts["skipped"] else Word.INFO.value)
     if not total:
         return word, ""
-    if word != Word.WITHIN.value:
-        return word, f"{counts[word]} of {total}"
-    loose = sum(map(beyond, rows))
-    return (Word.INFO.value, f"{loose} beyond") if loose else (word, str(total))
+    if word not in WRONG and (loose := sum(map(beyond, rows))):
+        return Word.INFO.value, f"{loose} beyond"
+    return word, str(total) if word == Word.WITHIN.value else f"{counts[word]} of {total}"
 
 
 def verdict(rows: Sequence[Row]) -> str:

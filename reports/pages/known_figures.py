@@ -300,6 +300,10 @@ def _rotations() -> Iterator[Said]:
         name, size = wanted[row["unit"]]
         yield f"farthest in {row['unit']}", (row["coordinate"], row["who"]), (name, WHO[1])
         yield f"largest error in {row['unit']}, and when", [row["size"], row["t"]], [size, 1.0]
+    first = Drawn().traces[0]
+    alike = [one | {"unit": "m"} for one in first.about["coordinates"]]
+    one = replace(first, about={**first.about, "coordinates": alike, "scales": [1.0, 3.0, 2.0]})
+    yield "size of a unit", errors.sizes([one])["m"], 3.0
     both = errors.told([*traces, *_turning([angles[0], 0.2 + 0.8 * t], t)[1:]])
     yield "the largest error in words", ("by 0.2 rad" in both, "by 0.1 rad" in both), (True, False)
 

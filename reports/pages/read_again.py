@@ -136,13 +136,13 @@ def _named(tables: Mapping[str, str], end: str) -> Lines:
 def counted(rows: Sequence[Row]) -> tuple[str, int, int]:
     """Return the worst word of the rows of a run, how many have it, and of how many.
 
-    What is within beside a number beyond its limit that is not judged, is not judged itself; then that is counted.
+    What is not outside, beside a number beyond its limit that is not judged, is not judged; then that is counted.
     """
     words = Counter(row["verdict"] for row in rows)
     total = sum(words[word] for word in WORDS)
     word = next((word for word in WORDS if words[word]), "skipped" if words["skipped"] else "not judged")
     loose = sum(map(beyond, rows))
-    return ("not judged", loose, total) if word == "within" and loose else (word, words[word], total)
+    return ("not judged", loose, total) if word in WORDS[2:] and loose else (word, words[word], total)
 
 
 def beyond(row: Row) -> bool:
@@ -218,7 +218,7 @@ def _of_worst(said: str, label: str, runs: Mapping[Run, Sequence[Row]]) -> Itera
     who, _, rest = said.removesuffix(f" ({place})").rpartition(": ")
     metric, _, number = rest.rpartition(" ")
     mine = [row for (one, _), rows in runs.items() if one == label for row in rows]
-    ranks = (*WORDS[:3], "not judged", "within")
+    ranks = (*WORDS[:2], "not judged", *WORDS[2:])
     least = min(ranks.index(row["verdict"]) for row in mine if _is_told(row))
     for row in mine:
         named = f"{row['engine']}:{row['profile']}".removesuffix(":") == who and row["metric"] == metric

@@ -169,7 +169,9 @@ def at_rest(cases: Sequence[CaseFiles]) -> str:
     """Say in which cases nothing moves, so that verdicts on them say little of motions; nothing if there are none."""
     still = [case.label for case in cases if case.about.get("still")]
     named = ", ".join(still[:NAMED]) + (f" and {len(still) - NAMED} more" if len(still) > NAMED else "")
-    return f"Nothing moves in {named}: the truth stays where it starts." if still else ""
+    starts = any(case.about.get("still") and "start" in case.about.get("parameters", {}) for case in cases)
+    hint = " --start NAME VALUE gives a robot file another start." if starts else ""
+    return f"Nothing moves in {named}: the truth stays where it starts.{hint}" if still else ""
 
 
 def _missing(label: str, engines: list[str], times: Times, broken: list[str]) -> tuple[str, ...]:

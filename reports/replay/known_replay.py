@@ -22,10 +22,12 @@ from crossbody import hw
 from crossbody.cases import Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.hw import Comparison, Log
+from crossbody.hw.checks.clock import ClockCheck
 from crossbody.hw.reading.columns import parse_columns
 from crossbody.hw.reading.stream import Rows, join
 from crossbody.hw.replaying import measures
-from crossbody.hw.windows.whiteness import noise_level
+from crossbody.hw.windows import rates
+from crossbody.hw.windows.whiteness import autocorrelation, noise_level
 from crossbody.reports.judging.asked import rows_of
 from crossbody.reports.judging.planted import Range
 
@@ -96,7 +98,7 @@ def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
     return tuple(
         (name, value, (wanted - within, wanted + within), what)
-        for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces)
+        for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces, _impacts, _needed, _looked)
         for name, what, value, wanted, within in rows_of(kind, _failed)
         if not abs(value - wanted) <= within
     )
@@ -278,3 +280,65 @@ def _bounces() -> Iterator[Asked]:
     yield "impulse_measured", told, rows["impulse_measured"], 2.0 * (1.0 + up), 1e-6
     yield "impulse_error", told, rows["impulse_error"], 2.0 * up * (less - 1.0), 1e-6
     yield "impacts_too_many", told, rows["impacts_too_many"], 0.0, 0.0
+    for more, (seen, said) in ((1.0, (at, LATER)), (-1.0, (LATER, at))):  # of two impacts the other motion has one
+        first, second = (_fallen(window.t, (at, hit)) for hit in (seen, said))
+        both: Any = replace(made, windows=(replace(window, y=first),), predictions=(replace(one, y=(second,)),))
+        yield "impacts_too_many", "a ball that bounces once more or less", _rows(both)["impacts_too_many"], more, 0.0
+
+
+LATER = 0.5
+"""When a ball bounces again, s."""
+FALLS = (0.117, 0.31, 0.4852)
+"""When a motion is bent, s: between samples and at one."""
+
+
+def _fallen(t: Floats, hits: tuple[float, ...]) -> Floats:
+    """Return a motion (n, 1) whose rate changes by so much at each of some instants, of the same ones but once."""
+    bent: Floats = np.sum([HEIGHT * np.maximum(t - hit, 0.0) for hit in sorted(set(hits))], axis=0)
+    return bent[:, None]
+
+
+def _impacts() -> Iterator[Asked]:
+    """Yield when impacts are, and how strong, of a motion that is straight between them."""
+    t, jumps = STEP * np.arange(62, dtype=np.float64), np.array([4.0, 3.0, 2.5])
+    y: Floats = -SPEED * t + np.sum(
+        [jump * np.maximum(t - hit, 0.0) for hit, jump in zip(FALLS, jumps, strict=True)], axis=0
+    )
+    found, told = rates.impacts(t, y, 0.2 * jumps[-1] / STEP), "a motion with three impacts"
+    yield "impacts", told, float(len(found.t)), float(len(FALLS)), 0.0
+    for k, (hit, jump) in enumerate(zip(FALLS, jumps.tolist(), strict=True)):
+        if k < len(found.t):
+            yield f"instant of impact {k}", told, float(found.t[k]), hit, EXACT
+            yield f"strength of impact {k}", told, float(found.jump[k]), jump, EXACT
+    other = replace(found, t=found.t[[0, 2]] + LATE, jump=found.jump[[0, 2]] - 1.0)
+    for k, (late, weaker) in enumerate(zip(*rates.matched(found, other), strict=True)):
+        yield f"how late impact {k} is", told, float(late), LATE, EXACT
+        yield f"how much weaker impact {k} is", told, float(weaker), -1.0, EXACT
+
+
+def _needed() -> Iterator[Asked]:
+    """Yield the torques that the motion of the link needs, away from their changes, and how well these are known."""
+    given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
+    found = hw.inverse(_link_log(), "single_pendulum", parameters=given, half=6, degree=4)
+    t = found.t - BEGINS
+    quiet = np.min(np.abs(t[:, None] - HELD * np.arange(len(TORQUES) + 1)), axis=1) > 8.0 * STEP
+    off = np.abs(found.value[:, 0] - _torque(t))[quiet]
+    told = "the link of known torques"
+    yield "torque that is needed", told, float(np.max(off)), 0.0, 1e-3 * max(map(abs, TORQUES))
+    yield "instants of torques", told, float(t[0]), 6.0 * STEP, EXACT
+
+
+def _looked() -> Iterator[Asked]:
+    """Yield what is found of clocks that drop samples or stand still, and how wide the band of a white residual is."""
+    even = STEP * np.arange(60, dtype=np.float64)
+    for what, times, check, count in (
+        ("a clock without fault", even, "dropped", 0), ("one sample that is lost", np.delete(even, 31), "dropped", 1),
+        ("two that are lost apart", np.delete(even, [20, 41]), "dropped", 2),
+        ("a time that stands twice", np.insert(even, 9, even[9]), "time", 1),
+    ):  # fmt: skip
+        clock = ClockCheck(STEP)
+        clock.see(np.arange(len(times)), times)
+        found = [one.count for one in clock.findings() if one.check == check]
+        yield f"{check} samples", what, float(sum(found)), float(count), 0.0
+    draw = np.random.default_rng(9).normal(size=400)
+    yield "band", "a white residual", autocorrelation(draw).band, 2.5758293035489 / 20.0, 1e-6

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crossbody import hw
+from crossbody.cases import InvalidValue
 from crossbody.reports import layout, voice
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ def info(path: Path, columns: str | None, part: int | None, draft_only: bool, me
 
     Reading may take so many MB over the file's own size.
     """
+    if part is not None and columns is None:
+        raise InvalidValue(f"--part {part}: only a column map separates runs; valid: --part with --columns MAP.")
     room = memory * 1_000_000
     found = hw.survey(path, columns, memory=room)
     if draft_only:

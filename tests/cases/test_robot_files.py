@@ -237,7 +237,7 @@ def test_a_row_that_is_nearly_dependent_is_named_and_left_out_or_kept(tmp_path: 
     for rank, moves in ((-1, True), (2, True), (3, False)):
         case = tilted(tmp_path, tilt, rank=rank)
         runs = [
-            engines.load(name).prepare(case, profile, rtol=1e-10).run()
+            engines.load(name).prepare(case, profile).run()
             for name, profile in (("reference", "compiled"), ("reference", "cvode"), ("pinocchio", "law"))
         ]
         for run in runs:
@@ -643,6 +643,38 @@ def test_inertia_of_an_actuator_on_a_tendon_is_refused(tmp_path: Path) -> None:
 def test_wrong_pushes_are_refused(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(InvalidValue, match=said):
         cases.load(write(tmp_path), "raised", push=text)
+
+
+LOOSE = """<mujoco><worldbody><body name="box"><freejoint name="free"/><geom size=".1 .1 .1" type="box"/>
+<body name="arm" pos="0 0 .2"><joint name="left arm"/><geom size=".05" pos=".1 0 0"/></body></body>
+</worldbody></mujoco>"""
+
+
+def test_a_start_is_given_by_the_names_of_coordinates_and_velocities(tmp_path: Path) -> None:
+    path = tmp_path / "floating.xml"
+    path.write_text(LOOSE)
+    case = cases.load(str(path), start="free z .7; left arm -.3", rate="free rx 2; left arm 1e-1; free y -4;")
+    assert case.q0.tolist() == [0.0, 0.0, 0.7, 1.0, 0.0, 0.0, 0.0, -0.3]
+    assert case.v0.tolist() == [0.0, -4.0, 0.0, 2.0, 0.0, 0.0, 0.1]
+    for name, wrong in (
+        ("start", "free qw 1"), ("start", "arm 1"), ("start", "left arm"), ("start", "left arm nan"), ("rate", "7"),
+    ):  # fmt: skip
+        with pytest.raises(InvalidValue, match=f"{name}: .* is no number of an entry; valid: .*left arm"):
+            cases.load(str(path), **{name: wrong})
+
+
+def test_a_urdf_that_starts_elsewhere_swings_alike_in_every_engine(tmp_path: Path) -> None:
+    path = tmp_path / "pendulum.urdf"
+    path.write_text(
+        '<robot name="p"><link name="base"/><link name="rod"><inertial><origin xyz="0 0 -.5"/><mass value="1"/>'
+        '<inertia ixx=".1" iyy=".1" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="hinge" '
+        'type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 1 0"/></joint></robot>'
+    )
+    case = cases.load(str(path), start="hinge 1.2", rate="hinge -2")
+    ends = [engines.load(name).prepare(case, profile).run().q[-1, 0] for name, profile in (
+        ("reference", "compiled"), ("mujoco", "matched"), ("pinocchio", "law"))]  # fmt: skip
+    assert ends == pytest.approx([ends[0]] * 3, abs=1e-6)
+    assert abs(ends[0]) > 0.1
 
 
 def test_shapes_that_meet_end_the_run(tmp_path: Path) -> None:

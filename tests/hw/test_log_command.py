@@ -49,6 +49,13 @@ def test_the_draft_alone_is_a_map_that_reads_the_log(
     assert "Draft" not in capsys.readouterr().out
 
 
+def test_a_part_without_a_map_that_separates_parts_is_refused(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("log", "info", path, "--part", "3") == 2
+    said = capsys.readouterr()
+    assert "--part 3: only a column map separates runs" in " ".join(said.err.split())
+    assert not said.out
+
+
 def test_a_gap_is_a_note_and_no_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     data = {name: np.delete(values, [70, 71]) for name, values in log_files.table(200).items()}
     path = log_files.write("parquet", tmp_path, data)

@@ -18,8 +18,11 @@ from crossbody.reports.analysis import known_analysis, numbers
 from crossbody.reports.bench import known_bench, measure
 from crossbody.reports.cli import cli
 from crossbody.reports.judging import known
+from crossbody.reports.maps import gapmap, known_maps
 from crossbody.reports.pages import known_pictures
-from crossbody.reports.replay import known_replay
+from crossbody.reports.replay import known_formats, known_replay
+from crossbody.reports.suites.axis import Log
+from crossbody.reports.sweep import execute, known_sweep
 
 SUPPORT = Path(__file__).parents[1] / "support"
 LOG = (str(SUPPORT / "falling_ball.csv"), "--columns", str(SUPPORT / "falling_ball.toml"), "-m", "ball", "-q")
@@ -29,9 +32,12 @@ COMMANDS = {
     "bench": ("bench", "bouncing_ball", "--variant", "linear", "--repeats", "1", "-q", "--out", "out"),
     "analyse": ("analyse", "bouncing_ball", "--variant", "linear", "-q"),
     "picture": ("picture", "none", "out"),
+    "stress": ("stress", "stiffness", "--runs", "1", "-q", "--out", "out"),
+    "gapmap": ("gapmap", "--n", "2", "--points", "2", "-q", "--out", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
 }  # fmt: skip
-MODULES = {"replay": known_replay, "bench": known_bench, "analyse": known_analysis, "picture": known_pictures}
+MODULES = {"replay": known_replay, "bench": known_bench, "analyse": known_analysis, "picture": known_pictures,
+           "stress": known_sweep, "gapmap": known_maps}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -58,6 +64,10 @@ OFF: dict[str, tuple[Any, str, Any]] = {
     "replay in a unit": (Source, "to_si", lambda source, raw: source.conversion.apply(raw)),
     "replay with deviations": (covariance, "LEVEL", 0.8),
     "bench": (measure, "NATIVE", 1),
+    "stress": (known_sweep, "residual", lambda run: 0.0),
+    "stress by its limit": (execute, "ACCOUNT", 1e6),
+    "stress along an axis": (Log, "at", lambda axis, u: axis.low + (axis.high - axis.low) * u),
+    "gapmap": (gapmap, "LARGEST_S", 1.5),
     "analyse": (numbers, "controllable", lambda model: len(model.states)),
     "analyse without damping": (LinearModel, "poles", lambda model: 1j * np.linalg.eigvals(model.A)),
 }
@@ -77,3 +87,18 @@ def test_a_number_that_is_off_is_told(what: str, monkeypatch: pytest.MonkeyPatch
         for cached in ("wrong", "_link_log", "_hanging"):
             if hasattr(module, cached):
                 getattr(module, cached).cache_clear()
+
+
+@pytest.mark.parametrize("column", ["t", "angle"])
+def test_a_log_that_is_read_as_another_one_is_told(column: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    library, write, before = known_formats.WRITERS["log.mat"]
+
+    def other(path: Path, data: known_formats.Table) -> None:
+        write(path, data | {column: data[column] * (1.0 + 1e-12)})
+
+    known_formats.wrong.cache_clear()
+    assert known_formats.wrong() == ()
+    monkeypatch.setitem(known_formats.WRITERS, "log.mat", (library, other, before))
+    known_formats.wrong.cache_clear()
+    assert {what for *_, what in known_formats.wrong()} == {"log.mat"}
+    known_formats.wrong.cache_clear()

@@ -16,6 +16,7 @@ from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Tier
 from crossbody.reports import metrics
 from crossbody.reports.judging import audit, controls, truth
+from crossbody.reports.judging.covered import covered
 from crossbody.reports.judging.run_verdicts import Entry, verdicts
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.truth import from_run
@@ -179,6 +180,40 @@ def test_friction_opposes_the_slip_of_the_points_on_which_a_puck_stands(tmp_path
     angle = metrics.of(case)["friction_angle"].measure(from_run(run, Tier.D, ""), run, case)
     assert angle is not None
     assert angle < 1e-9
+
+
+CAN = """
+<mujoco><default><geom solref="-5000 -50"/></default><worldbody><geom type="plane" size="2 2 .1"/>
+<body pos="0 0 .07"><freejoint/><geom type="capsule" size=".05 .1" mass="1" euler="0 90 0"/></body></worldbody>
+</mujoco>
+"""
+
+
+def test_a_can_that_lands_flat_and_never_slips_has_no_angle_of_friction(tmp_path: Path) -> None:
+    """Its ends open at one instant, one behind the other: what the last one slips by there is rounding."""
+    case = covered(robot(tmp_path, CAN, t_end=0.2), 5.0)
+    run = engines.load("reference").prepare(case, "compiled").run()
+    assert np.isin(run.mode, Mode.SLIP).any()
+    assert metrics.of(case)["friction_angle"].measure(from_run(run, Tier.D, ""), run, case) is None
+    measured = metrics.of(case)["lam_impulse_path"].measure(from_run(run, Tier.D, ""), run, case)
+    assert measured is None or measured < 1e-9
+
+
+RUBBER = """
+<mujoco><worldbody><geom type="plane" size="9 9 .1" friction="{mu} 0 0"/><body pos="0 0 .2">
+<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
+<geom type="sphere" size=".1" mass="1" friction="{mu} 0 0"/></body></worldbody>
+<keyframe><key name="s" qpos="0 -.05" qvel="9 0"/></keyframe></mujoco>
+"""
+
+
+@pytest.mark.parametrize("mu", [0.5, 6.0, 40.0])
+def test_controls_of_forces_hold_whatever_a_coefficient_of_friction_is(tmp_path: Path, mu: float) -> None:
+    """The largest force may be friction, which is measured by what pushes."""
+    case = covered(robot(tmp_path, RUBBER.format(mu=mu), key="s", t_end=0.2), 5.0)
+    known = from_run(engines.load("reference").prepare(case, "compiled").run(), Tier.D, "")
+    assert (known.trajectory.mode == Mode.SLIP).any()
+    assert [found for found in controls.unseen(case, known, lambda *_: True) if found[0] == "law_residual"] == []
 
 
 def test_a_truth_whose_witness_takes_too_long_is_held_to_the_same_budget(

@@ -16,6 +16,7 @@ from crossbody.reports.commands import run_shown
 from crossbody.reports.judging.parts import part_of
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.verdict import Row, Verdict, Word
+from crossbody.reports.runs.choice import DEFAULT_ENGINES
 
 NARROW = 62
 """Width that the errors of the longest name need."""
@@ -70,7 +71,9 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
     ]
     text = sentence(runs_of(rows))
     assert text.startswith("1 of 2 runs is within all limits. Without a limit: c:matched on ball:v.")
-    assert text.endswith("cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit).")
+    assert text.endswith(
+        "cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason."
+    )
     shown = click.unstyle(run_shown.table(runs_of(rows), {}, 200)).splitlines()
     assert [shown[0].split()[-2:], *(line.split()[-2:] for line in shown[2:])] == [
         ["beyond", "outside"], ["0", "0"], ["2", "0"], ["0", "0"]
@@ -223,3 +226,13 @@ def test_every_reason_is_told_once_behind_all_numbers_that_have_it(seed: int) ->
         assert line.startswith("outside") or f"these {len(mine)}:" in line
         seen = []
     assert sum(line.count("because") for line in lines) == len({one["why"] for one in rows})
+
+
+def test_engines_that_nobody_selected_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    run_shown.show_unselected(["reference"])
+    assert not capsys.readouterr().out
+    run_shown.show_unselected([])
+    said = capsys.readouterr().out
+    assert said.startswith("Not selected: ")
+    assert all(name in said for name in ("dart", "drake", "exudyn", "pymunk"))
+    assert not any(name in said for name in DEFAULT_ENGINES)

@@ -35,3 +35,13 @@ def test_settings_of_dart_are_read_back_from_its_world() -> None:
 def test_an_engine_that_shows_no_settings_has_no_row() -> None:
     run = engines.load("reference").prepare(cases.load("bouncing_ball", "linear"), "compiled")
     assert settings_kept(run.audit(), run.settings) == ()
+
+
+def test_settings_of_exudyn_are_read_back_from_its_solver() -> None:
+    pytest.importorskip("exudyn")
+    engine, case = engines.load("exudyn"), cases.load("bouncing_ball", "linear")
+    run = engine.prepare(case, "matched", rtol=1e-7, method="ODE23")
+    assert run.audit()["set"] == {"rtol": 1e-7, "method": "ODE23"}
+    assert settings_kept(run.audit(), run.settings)[0].ok
+    fixed = engine.prepare(case, "default", dt=7e-4)  # which the horizon is no multiple of
+    assert all(row.ok for row in settings_kept(fixed.audit(), fixed.settings))

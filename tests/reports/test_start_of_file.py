@@ -43,6 +43,18 @@ def test_controls_of_another_keyframe_are_told() -> None:
     assert wrong(replace(case, inputs=other.inputs)) == ["controls of the file"]
 
 
+@pytest.mark.parametrize("variant", ["one", "two"])
+def test_a_start_is_what_was_asked_for_in_place_of_the_keyframe(variant: str) -> None:
+    plain = cases.load(str(BOX), variant)
+    case = cases.load(str(BOX), variant, start="z .25; turn -1.5", rate="turn 3")
+    assert case.q0.tolist() == [plain.q0[0], 0.25, -1.5]
+    assert case.v0.tolist() == [*plain.v0[:2], 3.0]
+    assert wrong(case) == []
+    assert [row.quantity for row in start_of_file(case)][4:] == ["start as asked", "rate as asked"]
+    assert wrong(replace(case, q0=plain.q0)) == ["q of the file", "start as asked"]
+    assert wrong(replace(case, v0=case.v0[::-1].copy())) == ["v of the file", "rate as asked"]
+
+
 def changed(case: Case, times: Any = None, values: Any = None) -> Case:
     assert case.inputs is not None
     inputs = replace(

@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crossbody import engines
 from crossbody.cases import Case, load, names, variants
 from crossbody.reports.judging import stored
-from crossbody.reports.judging.run_verdicts import Entry
+from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.run_verdicts import Entry, measured
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Regression, Word
 
 ENDS = (math.inf, 0.5)
 """Up to when a truth is known, s."""
@@ -70,3 +74,35 @@ def test_a_table_of_runs_keeps_what_still_holds(seed: int) -> None:
                     assert found == pytest.approx(wanted if same and alike else {}, rel=6e-3, nan_ok=True)
                 assert stored.defaults(case, entry(who, 1e-3)) == (f"dt={dt:g}" if same else "")
                 assert stored.differing(case, entry(who, 1e-3)) == frozenset(wanted)
+
+
+def test_numbers_come_again_of_the_same_version_and_settings_up_to_the_horizon(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = load("bouncing_ball", "linear")
+    monkeypatch.setattr(stored, "versions", lambda engine: "one 1.0")
+    one, other = entry(ENGINES[0], 1e-3), entry(ENGINES[1], 1e-3)
+    found = {"position": 0.1, "velocity": 0.2}
+    stored.write([stored.laid(case, one, found, math.inf, ["velocity"]), stored.laid(case, other, found, math.inf)])
+    assert stored.repeated(case, one) == {"position"}
+    assert stored.repeated(case, other) == frozenset()  # steps that a tolerance chooses
+    assert stored.repeated(case, entry(ENGINES[0], 1e-4)) == frozenset()
+    assert stored.repeated(load("bouncing_ball", "linear", t_end=0.5), one) == frozenset()
+    monkeypatch.setattr(stored, "versions", lambda engine: "one 1.1")
+    assert stored.repeated(case, one) == frozenset()
+    stored.write([stored.laid(case, one, found, 0.5 * case.t_end, ["velocity"])])
+    monkeypatch.setattr(stored, "versions", lambda engine: "one 1.0")
+    assert stored.repeated(case, one) == frozenset()
+
+
+@pytest.mark.parametrize("part", [0.5, 0.94, 1.0, 1.06, 2.1])
+def test_another_number_than_the_same_version_gave_is_told(part: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A known deviation is outside then, any other number a regression: a step, a setting or a metric has changed."""
+    case = load("bouncing_ball", "linear")
+    prepared = engines.load("mujoco").prepare(case, "default")
+    made = Entry(engine="mujoco", profile="default", run=prepared.run(), settings=prepared.settings)
+    truth = truth_of(case)
+    found = measured(case, made, truth)
+    monkeypatch.setattr(stored, "versions", lambda engine: "mujoco 4")
+    stored.write([stored.laid(case, made, {name: value / part for name, value in found.items()}, truth.trusted, [])])
+    rows = {row.metric: row for row in judged(case, [made], truth, "")}
+    assert rows["position"].verdict == (Word.EXPECTED if part == 1.0 else Word.OUTSIDE)
+    assert rows["position"].regression == (Regression.KEPT if part == 1.0 else Regression.LOST)

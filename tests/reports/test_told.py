@@ -11,11 +11,11 @@ import pytest
 from crossbody.reports.importers.compare import OK, QUANTITIES, Row
 from crossbody.reports.importers.told import grid
 from crossbody.reports.judging.told import NAMED, known_until, runs_of, sentence
-from crossbody.reports.judging.verdict import Word
+from crossbody.reports.judging.verdict import UNMEASURED, Word
 from crossbody.reports.pages import grid as pages_grid
 
 CAUSE = "soft contacts, of a step: and what follows"
-KINDS = ("within", "expected", "outside", "unbounded", "unlimited", "skipped")
+KINDS = ("within", "expected", "outside", "unbounded", "unlimited", "skipped", "mixed")
 
 
 def row(who: str, verdict: Word, metric: str = "position", **more: Any) -> dict[str, Any]:
@@ -38,6 +38,9 @@ def rows_of(who: str, kind: str, times: float) -> list[dict[str, Any]]:
         "outside": [row(who, Word.OUTSIDE, **beyond), row(who, Word.OUTSIDE, "velocity", value=1.5e-3)],
         "unbounded": [row(who, Word.INFO, **beyond), row(who, Word.WITHIN, "velocity")],
         "unlimited": [row(who, Word.INFO, limit=None)],
+        "mixed": [
+            row(who, Word.EXPECTED, "velocity", value=1.0), row(who, Word.INFO, **beyond, why=UNMEASURED + CAUSE),
+        ],
     }[kind]]  # fmt: skip
 
 
@@ -54,15 +57,20 @@ def named(text: str, begin: str) -> tuple[list[str], int]:
 @pytest.mark.parametrize("seed", range(200))
 def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    kinds = rng.choice(KINDS, rng.integers(1, 16), p=[0.2, 0.2, 0.25, 0.2, 0.1, 0.05])
+    kinds = rng.choice(KINDS, rng.integers(1, 16), p=[0.2, 0.2, 0.2, 0.15, 0.1, 0.05, 0.1])
     times = dict(zip((f"e{k}:p" for k in range(len(kinds))), rng.uniform(2.0, 900.0, len(kinds)), strict=True))
-    by = {kind: [who for who, one in zip(times, kinds, strict=True) if one == kind] for kind in KINDS}
+    kinds_of = {"unbounded": ("unbounded", "mixed")}  # what is expected beside what nobody measured is not judged
+    by = {
+        kind: [who for who, one in zip(times, kinds, strict=True) if one in kinds_of.get(kind, (kind,))]
+        for kind in KINDS
+    }
     truth = row("truth:", Word.WITHIN, "truth", compared=float(rng.choice([0.31, 1.0])))
     told = [truth, *(one for who, kind in zip(times, kinds, strict=True) for one in rows_of(who, kind, times[who]))]
     text = sentence(runs_of(told))
     judged = sum(len(by[kind]) for kind in ("within", "expected", "outside", "unbounded"))
-    if not judged and by["unlimited"]:
-        assert text == "Nothing is judged, since no number has a limit."
+    if not judged:
+        why = "no number has a limit" if by["unlimited"] else "no engine has run"
+        assert text.startswith(f"Nothing is judged, since {why}.")
         return
     count = re.match(r"(\d+) of (\d+) runs (is|are) within all limits|The run (is not|is|deviates) ", text)
     assert count
@@ -90,15 +98,17 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
 @pytest.mark.parametrize(
     ("why", "said"),
     [
-        ("Known up to 0.2 s: more than one set keeps the law. Compiled.", " (more than one set keeps the law)"),
-        ("Compiled. Followed to 0.39 s of 1 s: more takes longer.", " (more takes longer)"),
-        ("Compiled at 1e-12 agrees.", ""),
+        ("Known up to 0.2 s: more than one set keeps the law. Compiled.", ("0.2 s", "more than one set keeps the law")),
+        ("Compiled. Followed to 0.39 s of 1 s: more takes longer.", ("0.39 s", "more takes longer")),
+        ("Compiled at 1e-12 agrees.", ("", "")),
     ],
 )
-def test_the_sentence_says_why_a_truth_is_known_in_part(why: str, said: str) -> None:
+def test_the_sentence_says_why_a_truth_is_known_in_part(why: str, said: tuple[str, str]) -> None:
     rows = [row("fake:one", Word.WITHIN), row("truth:", Word.WITHIN, "truth", why=why, compared=0.2)]
-    assert f"ball:hard, 0.2 of the horizon{said}." in sentence(runs_of(rows))
-    assert known_until(rows, 3.0) == (pytest.approx(0.6), said.strip(" ()"))
+    until, reason = said
+    part = f"{until}, 0.2 of the horizon ({reason})" if until else "0.2 of the horizon"
+    assert f"ball:hard, {part}." in sentence(runs_of(rows))
+    assert known_until(rows, 3.0) == (pytest.approx(0.6), reason)
     assert known_until(rows[:1], 3.0) == (3.0, "")
 
 

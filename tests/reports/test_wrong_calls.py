@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import random
+import subprocess
+import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -133,3 +136,24 @@ def test_complex_numbers_are_not_cut_to_real_ones() -> None:
     system = system_of(cases.load("bouncing_ball", "linear"))
     with pytest.raises(SceneError, match="complex"):
         simulate(system, np.array([1.0 + 2.0j]), [0.0], 0.1)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("analyse", "nope"),
+        ("analyse", "bouncing_ball", "--set", "nope=1"),
+        ("bode", "nope"),
+        ("bench", "nope"),
+        ("stress", "nope"),
+        ("identify", "nope.csv", "-m", "ball", "-f", "mass"),
+        ("replay", "nope.csv", "-m", "ball"),
+    ],
+)
+def test_a_wrong_name_is_told_before_the_reference_is_compiled(words: tuple[str, ...], tmp_path: Path) -> None:
+    command, kept = [sys.executable, "-m", "crossbody", *words], tmp_path / "cache"
+    env = os.environ | {"CROSSBODY_CACHE": str(kept)}
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "nope" in done.stderr
+    assert len([*kept.rglob("*.code")]) < 20  # kernels that are none's; the reference has 300 functions
