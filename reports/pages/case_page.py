@@ -1,7 +1,8 @@
-"""The page of one case: verdicts first, then playback, plots over one clock, runs, audit, provenance."""
+"""The page of one case: what is off, the motion, every number and why, plots over one clock, runs, provenance."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,18 +13,20 @@ from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import called, label, style
-from crossbody.reports.judging.told import beyond, known_until, lacking, telling
+from crossbody.reports.judging.told import beyond, farthest, known_until, lacking, runs_of, sentence, share, telling
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.errors import farthest_off
 from crossbody.reports.pages.friction import friction, hysteresis
-from crossbody.reports.pages.html import Link, Page
+from crossbody.reports.pages.html import BEYOND, Link, Page
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results, at_rest
 from crossbody.reports.runs.store import Trace
 
-PLOTTED = 900_000  # room for all plots of a page, bytes; the samples of each line follow from it
+NAMED = 6
+"""Numbers that a reason names."""
+PLOTTED = 800_000  # room for all plots of a page, bytes; the samples of each line follow from it
 RUNS = columns(
     called="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
     wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
@@ -39,20 +42,31 @@ AUDIT_TEXT = (
     "Before motions are compared, every engine must have the same physics: the mass matrix M, the bias forces, the "
     "Jacobian H of the gaps and the contact forces lam are evaluated at the same random states."
 )
+PLAINLY = {
+    Tier.A: "the exact solution, a formula",
+    Tier.B: "published digits of the solution",
+    Tier.C: "a solution on which two independent integrators agree",
+    Tier.D: "what the motion itself must keep, since no solution is known",
+}
+"""What each kind of truth is, to a reader who has not read of them."""
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
 
 
 def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     """All sections of one case, with a share of the usual room; its motions are forgotten with the page."""
     traces, rows = case.traces(), found.rows.get(case.label, [])
-    lead = f"{_lead(case.about)}{_compared(traces, rows)} {at_rest([case])}"
+    moving = playback(traces, share)
+    about, sources = _about(case.about)
+    said = sentence(runs_of(rows)).replace(f" on {case.label}", "") if rows else ""
     return Page(
-        name=case.page, title=case.label, lead=lead.strip(),
+        name=case.page, title=case.label, lead=f"{said} {at_rest([case])}".strip(),
+        about=f"{about}{_compared(traces, rows)}", sources=sources,
+        opening=sum(one.template == "playback.html" for one in moving),
         word=grid.verdict(rows),
         engines=[{"name": label(trace), "shown": called(trace), **style(trace)} for trace in traces],
         beside=_beside(found, case),
         sections=[
-            _glance(found, case), _verdicts(found, case), *playback(traces, share),
+            *moving, _glance(found, case), _verdicts(found, case),
             *_plots(traces, rows, share),
             *hysteresis(traces, share, figures.limits_of(rows)), *friction(traces, share),
             *precision(found.out, case.label, rows, _walls(found, case)), *studied(found.out, case.about),
@@ -68,14 +82,17 @@ def _beside(found: Results, case: CaseFiles) -> tuple[Link | None, Link | None]:
     return pages[at - 1], pages[at + 1]
 
 
-def _lead(about: Mapping[str, Any]) -> str:
+def _about(about: Mapping[str, Any]) -> tuple[str, str]:
+    """What is compared with what, in plain words, and where that is from."""
     if not about:
-        return "No motion of this case is stored."
-    tier = about.get("tier", "")
-    known = f"Compared with: {tier}" if figures.of_log(about) else f"Truth {tier[:1]}: {tier[2:]}"
-    truth = f" {known} ({about['source'].rstrip('.')})." if tier else ""
-    title = about["title"].rstrip(".")
-    return f"{title[:1].upper()}{title[1:]}.{truth}"
+        return "No motion of this case is stored.", ""
+    tier, title = about.get("tier", ""), about["title"].rstrip(".")
+    said = f"{title[:1].upper()}{title[1:]}."
+    if not tier:
+        return said, ""
+    known = tier if figures.of_log(about) else PLAINLY[Tier(tier)]
+    sources = tier if figures.of_log(about) else f"Truth {tier[:1]}: {tier[2:]}"
+    return f"{said} Compared with {known}.", f"{sources} ({about['source'].rstrip('.')})."
 
 
 def _compared(traces: Sequence[Trace], rows: Sequence[Row]) -> str:
@@ -119,12 +136,43 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": [row | {"beyond": beyond(row), "lacking": lacking(row)} for row in rows],
-            "counts": dict(Counter(row["verdict"] for row in rows).most_common()),
+            "rows": [row | {"beyond": beyond(row), "lacking": lacking(row), "times": _times(row)} for row in rows],
+            "counts": _counted(rows), "causes": _causes(rows), "off": any(_off(row) for row in rows),
             "truths": _truths(case.about), "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
         },
     )  # fmt: skip
+
+
+def _counted(rows: Sequence[Row]) -> dict[str, int]:
+    """How many rows have each word, the worst first; what is beyond a limit and not judged has one of its own."""
+    counts = Counter(BEYOND if beyond(row) else row["verdict"] for row in rows)
+    order = [*grid.WORST[:-1], BEYOND, Word.WITHIN.value]
+    return {word: counts[word] for word in [*order, *(word for word, _ in counts.most_common())] if counts[word]}
+
+
+def _off(row: Row) -> bool:
+    """Whether a number is beyond its limit, judged or not, or a run has crashed."""
+    return row["verdict"] in grid.WORST[:-1] or beyond(row)
+
+
+def _times(row: Row) -> str:
+    """How many times its limit a number is, where it is beyond it."""
+    times = share(row)
+    return f"{times:.2g}" if _off(row) and math.isfinite(times) else ""
+
+
+def _causes(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Why numbers are off, each reason once for each engine: with its word, and its numbers, the farthest out first."""
+    found: dict[tuple[str, str, str], list[Row]] = {}
+    for row in filter(_off, rows):
+        found.setdefault((row["who"], BEYOND if beyond(row) else row["verdict"], row["why"]), []).append(row)
+    causes = []
+    for (who, word, why), those in found.items():
+        first, *rest = [one["metric"] for one in sorted(those, key=farthest)]
+        names = [first, *rest] if len(rest) < NAMED else [first, *rest[: NAMED - 1], f"{len(rest) - NAMED + 1} more"]
+        causes.append({"who": who.removesuffix(":"), "word": word, "why": why or "No reason is known.", "names": names})
+    return causes
 
 
 def _truths(about: Mapping[str, Any]) -> str:

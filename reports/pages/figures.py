@@ -33,6 +33,9 @@ FIRST = {"motion": 3, "force": 2, "modes": 3, "penetration": 3}
 """Of these, how many are seen at once in each figure; the others are drawn when they are asked for."""
 BEYOND, FAR = 1.5, 4.0
 """Times the truth's largest force: up to which forces are drawn where any goes farther than the second."""
+SWINGS, OFTEN = 60.0, 4.0
+"""How often a force goes up or down by the truth's largest before its line is a comb that covers others, and times the
+truth's own."""
 NAMED = 6
 """Contacts without a force that are named; a robot has hundreds."""
 IDLE = 1e-9
@@ -223,10 +226,14 @@ def force(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, 
     largest = max(float(np.nanmax(np.abs(traces[0].run.lam), initial=0.0)), idle(traces[0].run))
     true = [_true_impulse(trace, traces[0]) for trace in traces]
     for place, k in enumerate(shown):
+        combs = chattering(traces, k)
         for i, trace in enumerate(traces):
             if np.isnan(trace.run.lam[:, k]).all():
                 continue
-            sheet.line(trace, 3 * place, trace.run.lam[:, k])
+            if label(trace) in combs:
+                sheet.band_of(trace, 3 * place, trace.run.lam[:, k], combs[label(trace)])
+            else:
+                sheet.line(trace, 3 * place, trace.run.lam[:, k])
             sheet.line(trace, 3 * place + 1, summed[i][:, k])
             if (exact := true[i]) is not None:
                 sheet.line(trace, 3 * place + 2, apart(summed[i][:, k], exact[:, k], floor), floor=floor)
@@ -271,6 +278,21 @@ def _noise(traces: Sequence[Trace]) -> float:
     """A force of rounding, of that which the energy makes over the way, N."""
     way = max(traces[0].about.get("scales", ()), default=0.0) or 1.0
     return IDLE * energy_of(traces[0].run) / way
+
+
+def chattering(traces: Sequence[Trace], k: int) -> dict[str, float]:
+    """Return the engines whose force of a contact goes up and down so often that its line would cover all others.
+
+    How often that is stands beside each, times the truth's largest.
+    """
+    largest = [float(np.nanmax(np.abs(one.run.lam[:, k]), initial=0.0)) for one in traces]
+    reach = largest[0] if label(traces[0]) == TRUTH and largest[0] > _noise(traces) else max(largest, default=0.0)
+    if not reach:
+        return {}
+    seen = [np.clip(np.nan_to_num(one.run.lam[:, k]), -BEYOND * reach, BEYOND * reach) for one in traces]
+    swings = [float(np.abs(np.diff(lam)).sum()) / reach for lam in seen]
+    own = swings[0] if label(traces[0]) == TRUTH else 0.0
+    return {label(one): n for one, n in zip(traces, swings, strict=True) if n > max(SWINGS, OFTEN * own)}
 
 
 def robust(traces: Sequence[Trace], k: int) -> tuple[tuple[float, float] | None, dict[str, float]]:
@@ -428,7 +450,7 @@ def note(name: str, traces: Sequence[Trace], limits: Limits = NONE) -> str:
         if len(found) > MOST_SIGNALS:
             told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
         if name in IDLE_NOTES and (rest := [name for k, name in names.items() if k not in found]):
-            told.append(f"{IDLE_NOTES[name]}: {few(_normals(rest))}.")
+            told.append(f"{IDLE_NOTES[name]}: {few(normals(rest))}.")
     if name == "energy" and (
         without := [label(one) for one in traces if one.run.ledger is None and label(one) != TRUTH]
     ):
@@ -444,14 +466,14 @@ def few(names: Sequence[str], most: int = NAMED) -> str:
     return ", ".join(names[:most]) + more
 
 
-def _normals(names: Sequence[str]) -> list[str]:
+def normals(names: Sequence[str]) -> list[str]:
     """Names without the tangential rows of contacts that are among them."""
     return [name for name in names if not (name[-2:] in WAYS and name[:-3] in names)]
 
 
 def _same(traces: Sequence[Trace]) -> Iterator[str]:
     names = traces[0].about["contacts"]
-    same = [[names[first], *_normals([names[k] for k in (first, *rest)])[1:]] for first, *rest in alike(traces)]
+    same = [[names[first], *normals([names[k] for k in (first, *rest)])[1:]] for first, *rest in alike(traces)]
     groups = [f"same as {first}: {few(rest, 3)}" for first, *rest in same if rest]
     if groups:
         yield f"The {'; the '.join(groups[:NAMED])}{f'; and {len(groups) - NAMED} more' * (len(groups) > NAMED)}."
@@ -462,7 +484,7 @@ def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
     for contact, mode in changing(traces)[1]:
         found.setdefault(mode, []).append(contact)
     for mode, names in found.items():
-        yield f"{mode} throughout, in every engine: {few(_normals(names))}."
+        yield f"{mode} throughout, in every engine: {few(normals(names))}."
 
 
 MATCHED = "Coordinates, and |difference from the truth|, impacts matched"

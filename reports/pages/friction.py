@@ -19,6 +19,7 @@ from crossbody.reports.pages.figures import (
     ROUNDING,
     Limits,
     carrying,
+    chattering,
     clipped,
     force_kind,
     gap_limits,
@@ -32,6 +33,7 @@ from crossbody.reports.scenes.scene import slip
 MOST_CONTACTS = 6  # of which one can be chosen
 DOT = 3e-3  # part of a plot that a line is not seen below
 MOST_OF_DEPTH = 1500  # points of one engine's line
+MOST_OF_COMB = 400  # points of an engine whose line would be a comb
 OVER_DEPTH = (
     "Force over penetration depth of one contact. A spring gives a line; damping opens it to a loop "
     "whose area is the energy lost. A force below zero pulls. Where an engine goes far beyond the truth, the axes end "
@@ -95,13 +97,19 @@ def _loop(traces: Sequence[Trace], k: int, most: int, name: str, limits: Limits)
             {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in edges
         ],
     }  # fmt: skip
+    combs = chattering(traces, k)
+    told += [
+        f"Points: {', '.join(sorted(combs))}, whose contact opens and closes or swings too often for a line"
+    ] * bool(combs)
+    layout["title"] = {"text": ". ".join(told)}
     wide = [max(float(np.nanmax(np.abs(one[axis]))) for _, one in points) for axis in (0, 1)]
-    lines = [
+    lines = [_points_of(trace, x, y) for trace, (x, y) in points if label(trace) in combs]
+    lines += [
         _drawn(trace, x, y, "lines+markers", marker={"size": 7})
         if _one_place(x, y, wide)
         else _drawn(trace, x, y, "lines")
-        for trace, (x, y) in points
-    ]
+        for trace, (x, y) in points if label(trace) not in combs
+    ]  # fmt: skip
     return Plot(name=name, figure={"data": lines, "layout": layout}, choice=contact)
 
 
@@ -120,6 +128,13 @@ def _drawn(trace: Trace, x: Floats, y: Floats, mode: str, **more: Any) -> dict[s
         "name": plain(label(trace)), "meta": label(trace),
         "line": {key: look[key] for key in ("color", "dash", "width")},
     } | more  # fmt: skip
+
+
+def _points_of(trace: Trace, x: Floats, y: Floats) -> dict[str, Any]:
+    """Samples of one engine in a plane, faint: those of a comb, below the lines of others."""
+    known = np.isfinite(x) & np.isfinite(y) & (y != 0.0)
+    x, y = (each[known][:: max(1, -(-int(known.sum()) // MOST_OF_COMB))] for each in (x, y))
+    return _drawn(trace, x, y, "markers", marker={"size": 3, "opacity": 0.4, "color": style(trace)["color"]})
 
 
 def _busiest(traces: Sequence[Trace]) -> list[int]:

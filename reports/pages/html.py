@@ -141,7 +141,9 @@ class Page:
         name: of its file, without ".html".
         title: heading.
         sections: in order.
-        lead: one line below the heading.
+        lead: what is most important, below the heading.
+        about: what the page is of and what it is held against, in a sentence; sources: where that is from, folded.
+        opening: how many sections stand before the list of all.
         word: the verdict in few words, for the name of the window.
         engines: label and style of every engine that can be shown and hidden on it.
         beside: the pages before and after it, if it is one of a row.
@@ -151,6 +153,9 @@ class Page:
     title: str
     sections: Sequence[Section]
     lead: str = ""
+    about: str = ""
+    sources: str = ""
+    opening: int = 0
     word: str = ""
     engines: Sequence[Mapping[str, Any]] = ()
     beside: tuple[Link | None, Link | None] = (None, None)

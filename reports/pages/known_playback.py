@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Mode
+from crossbody.cases import Event, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Body, Joint, Loop, Pair, Scene, Shape
 from crossbody.cases.scene_plain import plain
@@ -50,7 +50,6 @@ def _playback() -> Iterator[Said]:
     yield "the longest arrow", packed["force"], sorted(largest)[1]
     yield "the longest arrow of a blow", packed["impulse"], sorted(blows)[1]
     yield "the end", packed["end"], max(float(one.run.t[-1]) for one in made.traces)
-    yield "events", packed["events"], sorted(e.t for e in made.traces[0].run.events)
     yield "engines", tuple(track["name"] for track in packed["tracks"]), WHO
     for i, track in enumerate(packed["tracks"]):
         yield from _track(i, track)
@@ -70,9 +69,24 @@ def _track(i: int, track: Any) -> Iterator[Said]:
     impulses = [[e.impulse if e.contact == k else 0.0 for k in range(OFF)] for e in struck]
     at = made.at(i, np.array([e.t for e in struck]))
     yield f"blows of {who}", numbers(track["blows"]), _arrows(at, np.array(impulses)).reshape(len(struck), -1)
+    instants, told = track["happens"]
+    apart = 0.0 if i == 0 else max(float(one.run.t[-1]) for one in made.traces) / 600.0
+    events = sorted(run.events, key=lambda event: event.t)
+    alone = [e for e in events if not any(0.0 <= e.t - other.t <= apart for other in events if other is not e)]
+    firsts = [e.t for e in alone]
+    yield f"first events of {who}", [t for t in instants if t in firsts], firsts
+    yield f"how late an event of {who} may be told", float(_latest(instants, events) <= apart), 1.0
+    single = [e for e in alone if not any(0.0 <= other.t - e.t <= apart for other in events if other is not e)]
+    words = tuple(f"{CONTACTS[e.contact]} {'bounces' if e.impulse else 'touches'}" for e in single)
+    yield f"what happens in {who}", tuple(told[instants.index(e.t)] for e in single), words
     yield f"whether {who} is the truth", float(track["truth"]), float(i == 0)
     if i:
         yield f"colour of {who}", track["color"], look(who)["color"]
+
+
+def _latest(instants: list[float], events: list[Event]) -> float:
+    """Return how long after the last instant that is told before it an event comes at most, s."""
+    return max(e.t - max((t for t in instants if t <= e.t), default=-np.inf) for e in events)
 
 
 def _since(samples: Floats, lam: Floats, pictures: Floats) -> Iterator[Floats]:

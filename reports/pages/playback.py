@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import CrossbodyError, Trajectory
+from crossbody.cases import CrossbodyError, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats, distinct, quantiles
 from crossbody.reports import scenes
 from crossbody.reports.figures.section import Section
@@ -17,19 +17,30 @@ from crossbody.reports.figures.styles import coded, label, style
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.errors import told
-from crossbody.reports.pages.figures import carrying
+from crossbody.reports.pages.figures import carrying, few, normals
 from crossbody.reports.pages.filled import filled
 from crossbody.reports.runs.store import Trace
 
 ROOM = 280_000  # room of the motions on a page, bytes
 FEWEST, MOST = 60, 900
 BLOWS = 200
-"""Impulses of one engine that are drawn, and events that one steps through, evenly chosen of more."""
+"""Impulses of one engine that are drawn, evenly chosen of more, and its instants that one steps through, of more
+those that are near put together."""
+FEW = 2  # contacts, and what they do, that are named of one instant
+FRAMES = 600
+"""Frames of a motion at its usual speed: what an engine does within one of them is one event."""
+HAPPENS = {
+    Mode.FREE: "opens", Mode.CONTACT: "presses", Mode.BALLISTIC: "lets go below the surface",
+    Mode.COLLISION: "collides", Mode.COLLISION_SEPARATION: "separates", Mode.BILATERAL: "holds", Mode.STICK: "sticks",
+    Mode.SLIP: "slips",
+}  # fmt: skip
+"""What a contact does when it comes into a mode."""
 TEXT = (
     "All engines at the same time, which the plots below share. Arrows are contact forces, with "
     "lengths proportional to the force; each shows the largest force since the previous frame, so "
     "that no impact is missed. An instantaneous collision has an impulse instead of a force: a "
-    "hollow arrow that fades. Differences from the truth can be exaggerated 10 and 100 times."
+    "hollow arrow that fades. An arrow that is cut off has a bar across. Differences from the truth can be "
+    "exaggerated 10 and 100 times, of all engines or of one, at the scale of the picture, which they may leave."
 )
 
 
@@ -54,7 +65,7 @@ def playback(traces: Sequence[Trace], share: float = 1.0) -> list[Section]:
         Section(
             name="playback", title="Playback", text=f"{TEXT} {told(traces)}".strip(), template="playback.html",
             context={"scene": scene, "caption": caption,
-                     "frames": scene["stage"]["frames"], "events": bool(scene["events"]),
+                     "frames": scene["stage"]["frames"],
                      "compared": len(scene["tracks"]) > 1 and any(track["truth"] for track in scene["tracks"])},
         )
     ]  # fmt: skip
@@ -70,12 +81,14 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene, share: float = 1.0) -> 
     width = 1 + scene.poses(traces[0].run.q[:1], parameters)[0].size + 2 * stage.dimensions * int(pushing.sum())
     frames = int(np.clip(share * ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
     drawn = [_track(trace, scene, parameters, frames, pushing) for trace in traces if len(trace.run.t)]
+    end = max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0)
+    for trace, track in zip((one for one in traces if len(one.run.t)), drawn, strict=True):
+        track["happens"] = happens(trace, 0.0 if track["truth"] else end / FRAMES)
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
-        "end": max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0),
+        "end": end, "frame": end / FRAMES,
         "force": typical(_largest(trace.run.lam[:, bearing]) for trace in traces),
         "impulse": typical(_largest(np.array([e.impulse for e in trace.run.events])) for trace in traces),
-        "events": events(traces[0].run),
     }  # fmt: skip
 
 
@@ -93,10 +106,43 @@ def _pushing(
     return found
 
 
-def events(run: Trajectory) -> list[float]:
-    """Instants that the buttons lead to, s: those of the first motion, the truth's where there is one."""
-    found = distinct([event.t for event in run.events])
-    return [float(found[i]) for i in distinct(np.linspace(0, len(found) - 1, min(len(found), BLOWS)).astype(int))]
+def happens(trace: Trace, within: float) -> tuple[list[float], list[str]]:
+    """Instants of one motion that the buttons lead to, s, and what happens there in a few words.
+
+    Events are put together that come within so long after a first one, s: longer where there are very many.
+    """
+    events = sorted(trace.run.events, key=lambda event: event.t)
+    found = _together(events, within)
+    if len(found) > BLOWS:
+        found = _together(events, max(within, (events[-1].t - events[0].t) / (BLOWS - 1)))
+    return [each[0].t for each in found], [_said(each, trace.about["contacts"]) for each in found]
+
+
+def _together(events: Sequence[Event], within: float) -> list[list[Event]]:
+    """Events in order, those together that come within so long after the first of them, s."""
+    found: list[list[Event]] = []
+    for event in events:
+        if found and event.t - found[-1][0].t <= within:
+            found[-1].append(event)
+        else:
+            found.append([event])
+    return found
+
+
+def _said(events: Sequence[Event], contacts: Sequence[str]) -> str:
+    """Which contacts do what, or how many events of them there are."""
+    names = normals(list(dict.fromkeys(contacts[event.contact] for event in events)))
+    does = list(dict.fromkeys(map(_does, events)))
+    said = " and ".join(does) if len(does) <= FEW and len(events) <= 2 * FEW * len(names) else f"{len(events)} events"
+    return f"{names[0]} {said}" if len(names) == 1 and len(does) <= FEW else f"{few(names, FEW)}: {said}"
+
+
+def _does(event: Event) -> str:
+    """What a contact does."""
+    if event.impulse:
+        return "bounces"
+    touches = event.before == Mode.FREE and event.after in (Mode.CONTACT, Mode.COLLISION)
+    return "touches" if touches else HAPPENS[event.after]
 
 
 def _track(

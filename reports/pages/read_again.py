@@ -35,6 +35,7 @@ _TILE = re.compile(r'<li class="[^"]*"><strong>(\d+)</strong> ([^<]*)</li>')
 _DATA = re.compile(r'data-(v|name|engine)="([^"]*)"')
 _TAGS = re.compile(r"<[^>]*>")
 _PLACE = re.compile(r" \(([^()]* by [^()]* at [^()]*)\)$")
+_CHIPS = re.compile(r'<p class="counts">(.*?)</p>', re.DOTALL)
 _NUMBER = re.compile(r"(?:< )?(-?(?:\d[\d.]*(?:e[+-]\d+)?|inf))$")
 
 
@@ -95,7 +96,11 @@ def check(out: Path, rows: Sequence[Row], times: Times) -> None:
             differing += [*_of_tiles(text, rows), *_of_known(tables, rows)]
         else:
             mine = {who: found for (label, who), found in runs.items() if label == pages[name]}
-            differing = [*_of_verdicts(tables, mine), *_of_glance(tables, mine, times, pages[name])]
+            differing = [
+                *_of_verdicts(tables, mine),
+                *_of_chips(text, mine),
+                *_of_glance(tables, mine, times, pages[name]),
+            ]
             differing += _of_times(tables, pages[name], times)
         if differing:
             raise OwnFault(f"{name} does not show what was judged: {differing[0]}.")
@@ -305,15 +310,33 @@ def _of_verdicts(tables: Mapping[str, str], runs: Mapping[str, Sequence[Row]]) -
     """Yield rows of a case that are not in its table as they are."""
     lines = _named(tables, "-verdicts")
     found = Counter(
-        (word.value, who, metric.text, *(one.value for one in numbers))
-        for who, (word, _, metric, *numbers) in ((who, cells[:6]) for who, cells in lines[1:])
+        (word.value, who, metric.text, *(one.value for one in numbers), times.value, where.text)
+        for who, (word, _, metric, *numbers, _, times, where) in ((who, cells[:9]) for who, cells in lines[1:])
     )
     wanted = Counter(
-        (row["verdict"], who, row["metric"], *(_text(row[name]) for name in ("value", "expected", "limit")))
+        (row["verdict"], who, row["metric"], *(_text(row[name]) for name in ("value", "expected", "limit")),
+         _multiple(row), " ".join((row.get("where") or "").split()))
         for who, rows in runs.items() for row in rows
     )  # fmt: skip
     for row in [*(wanted - found), *(found - wanted)]:
         yield f"{' '.join(row)} {'is not there' if row in wanted else 'is no row'}"
+
+
+def _multiple(row: Row) -> str:
+    """How many times its limit a number is that is beyond it, in two digits; nothing where that is no number."""
+    times = times_out(row)
+    off = row["verdict"] in WORDS[:3] or beyond(row)
+    return f"{times:.2g}" if off and math.isfinite(times) else ""
+
+
+def _of_chips(text: str, runs: Mapping[str, Sequence[Row]]) -> Iterator[str]:
+    """Yield words of verdicts whose count is another one, or that are not counted."""
+    rows = [row for mine in runs.values() for row in mine]
+    wanted = Counter("beyond, not judged" if beyond(row) else row["verdict"] for row in rows)
+    said = html.unescape(_TAGS.sub("", _CHIPS.findall(text)[0]))
+    found = Counter({word.strip(): int(count) for count, word in re.findall(r"(\d+) ([^\d\n]+)", said)})
+    for word in [*(wanted - found), *(found - wanted)]:
+        yield f"{found[word]} {word}, not {wanted[word]}"
 
 
 def _text(value: float) -> str:

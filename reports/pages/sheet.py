@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from textwrap import wrap
 from typing import Any
 
@@ -26,9 +27,13 @@ TOP, BOTTOM, PLOT, TALL, CLOSE, APART = 34, 50, 128, 320, 16, 46
 group, between groups (with times), pixels."""
 NAME = 12  # height of the name of a line beside its plot, pixels
 SEEN = 6  # height of a band that is seen around the truth, pixels
+USUAL = "limit"  # what the limit of most engines is called
 NARROW = 4  # limits around the truth that are said, where they are narrower than its line
 LONG = 0.02  # part of the horizon: a line of errors is broken where a run has no sample for longer
 LEAP = 100.0  # times a floor: a line that goes from there farther within one sample is broken
+PARTS, EACH = 60, 8
+"""Parts of the horizon, at most, of each of which the least, largest and mean of a comb is drawn, and how often it goes
+up or down in one: fewer would draw the comb itself."""
 DIGITS = 12  # of the mantissa of a value on a logarithmic axis, bits: four decimal ones
 MODE_COLOURS = {
     Mode.FREE: "#9aa5b1", Mode.CONTACT: "#0072B2", Mode.BALLISTIC: "#E69F00", Mode.COLLISION: "#D55E00",
@@ -58,6 +63,7 @@ class Sheet:
         self.far: dict[str, list[tuple[float, str, str]]] = {}
         self.limits: list[tuple[int, float, str]] = []
         self.bands: list[tuple[int, float, str]] = []
+        self.combs: dict[str, None] = {}
         self.sparse, self.end = False, 0.0
 
     def limit(self, row: int, value: float, name: str) -> None:
@@ -109,6 +115,29 @@ class Sheet:
         with np.errstate(over="ignore"):  # what is larger than any plot shows is a gap
             self.lines.append((row, drawn_y.astype(np.float32), line))
 
+    def band_of(self, trace: Trace, row: int, y: Floats, swings: float) -> None:
+        """Draw of a comb its least to largest in every part of the horizon, below all lines, and its mean over time.
+
+        It goes up or down so often in all.
+        """
+        t, y = trace.run.t, np.nan_to_num(y)
+        edges = np.linspace(t[0], t[-1], int(np.clip(swings / EACH, 2, PARTS)) + 1)
+        cuts = np.searchsorted(t, edges)
+        some = [y[max(a - 1, 0) : b + 1] for a, b in pairwise(cuts)]
+        low, high = (np.array([kind(part) for part in some]) for kind in (np.min, np.max))
+        way = np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(t))])
+        mean = np.diff(np.interp(edges, t, way)) / np.diff(edges)
+        self.line(trace, row, np.append(mean, mean[-1]), edges, shape="hv")
+        color, sides = style(trace)["color"], np.repeat(edges, 2)[1:-1]
+        around = np.concatenate([np.repeat(high, 2), np.repeat(low, 2)[::-1]])
+        band = {
+            "type": "scatter", "x": coded(_times(np.concatenate([sides, sides[::-1]]))), "name": "",
+            "meta": label(trace), "mode": "lines", "line": {"width": 0, "color": color}, "fill": "toself",
+            "fillcolor": color, "opacity": 0.25, "hoverinfo": "skip",
+        }  # fmt: skip
+        self.lines.insert(0, (row, around.astype(np.float32), band))
+        self.combs[label(trace)] = None
+
     def _dots(
         self, trace: Trace, row: int, t: Floats, y: Floats, at: NDArray[np.intp], color: str
     ) -> None:  # fmt: skip
@@ -141,17 +170,19 @@ class Sheet:
     def _seen(self) -> tuple[dict[int, list[tuple[float, str]]], list[str]]:
         """Half widths and names of the bands that are wider than the line that they are around, and what others are."""
         found: dict[int, list[tuple[float, str]]] = {}
-        narrow: dict[int, dict[str, None]] = {}
+        narrow: dict[int, dict[str, float]] = {}
         for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
             seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
             if 2.0 * half * PLOT > SEEN * np.ptp(seen):
                 found.setdefault(row, []).append((half, name))
             else:
-                unit = self.rows[row].partition("\n")[2].strip("[]")
-                narrow.setdefault(row, {})[f"±{half:.2g} {unit} ({name})"] = None
+                halves = narrow.setdefault(row, {})
+                halves[name] = min(half, halves.get(name, half))
         alike: dict[str, dict[str, None]] = {}
-        for row, texts in narrow.items():
-            alike.setdefault(", ".join(texts), {})[self.rows[row].partition("\n")[0]] = None
+        for row, halves in narrow.items():  # of several that nobody sees, the usual one is said, or the narrowest
+            name = USUAL if USUAL in halves else min(halves, key=lambda one: halves[one])
+            title, _, unit = self.rows[row].partition("\n")
+            alike.setdefault(f"±{halves[name]:.2g} {unit.strip('[]')} ({name})", {})[title] = None
         return found, [f"{', '.join(titles)} {text}" for text, titles in alike.items()]
 
     def _caption(
@@ -164,6 +195,7 @@ class Sheet:
         told += [f"Grey around the truth: {', '.join(names)}"] if names else []
         more = f"; and {len(narrow) - NARROW} more" if len(narrow) > NARROW else ""
         told += [f"Limits narrower than a line: {'; '.join(narrow[:NARROW])}{more}"] if narrow else []
+        told += [f"Shade and line: least to largest of {', '.join(self.combs)}, and its mean"] if self.combs else []
         told += ["Dots: the ends of long steps, between which no error is known"] if self.sparse else []
         return ". ".join([self.title, *told])
 

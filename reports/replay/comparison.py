@@ -167,9 +167,9 @@ def findings(found: Comparison) -> pd.DataFrame:
 
 
 def correlations(found: Comparison) -> pd.DataFrame:
-    """Residual tests: every lag of every autocorrelation and of every correlation with an input."""
+    """Residual tests: every lag, also in s, of every autocorrelation and of every correlation with an input."""
     rows = [row for prediction in found.predictions for row in _correlations(found, prediction)]
-    return pd.DataFrame(rows, columns=["who", "channel", "input", "lag", "value", "band"])
+    return pd.DataFrame(rows, columns=["who", "channel", "input", "lag", "lag_s", "value", "band"])
 
 
 def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[str, Any]]:
@@ -185,8 +185,8 @@ def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[st
         for name, test in tests.items():
             for lag, value in zip(test.lags.tolist(), test.values.tolist(), strict=True):
                 yield {
-                    "who": who, "channel": c.name, "input": name, "lag": lag, "value": value,
-                    "band": test.band,
+                    "who": who, "channel": c.name, "input": name, "lag": lag,
+                    "lag_s": lag * test.stride * found.log.sample_time, "value": value, "band": test.band,
                 }  # fmt: skip
 
 

@@ -33,8 +33,8 @@ def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()
                 data += [*_band(t, seen - left, noise.get(channel, np.nan), place), _line(t, seen, "measured", place)]
                 data[-1]["line"] = {"color": GREY, "width": 4}
             data.append(_line(t, seen - left, str(who), place, engine=True))
-    return _figure("Measured and predicted", data, [f"{name}\n[{unit}]" for name, unit in channels], "time [s]",
-                   _shades(rows, held, len(channels)))  # fmt: skip
+    title, axes = f"Measured and predicted{_noises(channels, noise)}", [f"{name}\n[{unit}]" for name, unit in channels]
+    return _figure(title, data, axes, "time [s]", _shades(rows, held, len(channels)))
 
 
 def residual(
@@ -51,46 +51,61 @@ def residual(
             t, _, left = _broken(line)
             data.append(_line(t, left, str(who), place, engine=True))
         half = SIGMAS * noise.get(channel, np.nan)
-        shapes += [_rectangle(place, y=(-half, half))] if np.isfinite(half) else []
+        edge = {"line": {"width": 1.5, "color": GREY}}
+        shapes += [_rectangle(place, y=(-half, half)) | edge] if np.isfinite(half) else []
         shapes += [level(f"y{number(place)}", side * limits[channel], "limit") for side in (-1, 1) if channel in limits]
     return _figure(
-        "Measured less predicted", data, [f"{name}\n[{unit}]" for name, unit in channels], "time [s]", shapes
+        f"Measured less predicted{_noises(channels, noise)}",
+        data,
+        [f"{name}\n[{unit}]" for name, unit in channels],
+        "time [s]",
+        shapes,
     )
 
 
 def correlation(rows: pd.DataFrame) -> Figure:
-    """Autocorrelation of the residuals and their correlation with the inputs, beside the 99 % band."""
+    """Autocorrelation of the residuals and their correlation with the inputs, beside the 99 % band.
+
+    Lags are in s, where the rows say how long they are.
+    """
+    lags, below = ("lag_s", "lag [s]") if "lag_s" in rows else ("lag", "lag [averages of residuals]")
     kinds = list(dict.fromkeys(zip(rows["channel"], rows["input"], strict=True)))
     data, shapes = [], []
     for place, (channel, given) in enumerate(kinds, start=1):
         chosen = rows[(rows["channel"] == channel) & (rows["input"] == given)]
         for who, line in chosen.groupby("who", sort=False):
-            lag, value = line["lag"].to_numpy(float), line["value"].to_numpy(float)
+            lag, value = line[lags].to_numpy(float), line["value"].to_numpy(float)
             data.append(
                 _line(lag, value, str(who), place, engine=True) | {"mode": "lines+markers", "marker": {"size": 4}}
             )
         band = float(chosen["band"].iloc[0])
         shapes.append(_rectangle(place, y=(-band, band)))
     names = [f"{channel} with\n{given or 'itself'}" for channel, given in kinds]
-    made = _figure(
-        "Correlation of the residuals; 99 % band in grey", data, names, "lag [averages of residuals]", shapes
-    )
+    made = _figure("Correlation of the residuals; 99 % band in grey", data, names, below, shapes)
     made["layout"]["meta"] = "ends"  # where the page names lines
     return made
 
 
 def profile(rows: pd.DataFrame, estimates: pd.DataFrame) -> Figure:
-    """How the cost rises about every estimate, 95 % intervals in grey; a parabola if linear."""
+    """How the sum of squares rises about every estimate, in % of that there, 95 % intervals in grey.
+
+    Dashed is how far a parabola through its values rises at the ends of an interval: where the line meets it elsewhere,
+    the interval is another one.
+    """
     names = list(dict.fromkeys(rows["name"]))
     known = estimates.set_index("name")
     data, shapes = [], []
     for place, name in enumerate(names, start=1):
         line = rows[rows["name"] == name]
-        values, rise = line["value"].to_numpy(float), line["cost"].to_numpy(float) - 1.0
+        values, rise = line["value"].to_numpy(float), 100.0 * (line["cost"].to_numpy(float) - 1.0)
         data.append(_line(values, rise, name, place) | {"mode": "lines+markers", "showlegend": False})
-        shapes.append(_rectangle(place, x=(float(known["low"][name]), float(known["high"][name]))))
-    layout = _figure("Cost near each estimate minus the cost at it; 95 % interval in grey", data,
-                     ["rise of the\ncost [1]"] * len(names), "", shapes)  # fmt: skip
+        low, high = float(known["low"][name]), float(known["high"][name])
+        shapes.append(_rectangle(place, x=(low, high)))
+        away, half = (values - 0.5 * (low + high)) ** 2, 0.5 * (high - low)
+        if np.isfinite(half) and np.any(away > 0.0):
+            shapes.append(level(f"y{number(place)}", float(away @ rise / (away @ away)) * half**2, "95 %"))
+    layout = _figure("Rise of the sum of squares about each estimate; 95 % interval in grey, dashed: the rise of a "
+                     "parabola at its ends", data, ["sum of squares\n[% more]"] * len(names), "", shapes)  # fmt: skip
     for place, name in enumerate(names, start=1):
         axis = layout["layout"][f"xaxis{number(place)}"]
         axis |= {"title": {"text": f"{plain(name)} [{known['unit'][name]}]"}, "exponentformat": "power"}
@@ -119,6 +134,13 @@ def together(rows: pd.DataFrame) -> Figure:
                       "automargin": True, "scaleanchor": "x", "constrain": "domain"},
         },
     }  # fmt: skip
+
+
+def _noises(channels: Sequence[tuple[str, str]], noise: Mapping[str, float]) -> str:
+    """How wide the grey bands are: one that is narrower than a line is not seen."""
+    halves = [(name, SIGMAS * noise.get(name, np.nan), unit) for name, unit in channels]
+    told = [f"{plain(name)} ±{half:.2g} {unit}" for name, half, unit in halves if np.isfinite(half)]
+    return f". Grey: noise of the measurement, {SIGMAS:g} standard deviations: {', '.join(told)}" if told else ""
 
 
 def _channels(rows: pd.DataFrame) -> list[tuple[str, str]]:

@@ -35,9 +35,9 @@ OF_FIT = (
     "windows."
 )
 PROFILE = (
-    "The profile is the increase of the cost (sum of squares) when one parameter is moved and "
-    "all others are fitted again. If it is a symmetric parabola, the intervals from "
-    "derivatives can be trusted; if it is flat or asymmetric, they cannot. The data hardly "
+    "The profile is how much the sum of squares rises, in % of that at the estimate, when one parameter is moved and "
+    "all others are fitted again. If it meets the dashed line at both ends of the grey interval, it is a parabola, and "
+    "the interval from derivatives can be trusted; if it is flat or asymmetric, it cannot. The data hardly "
     "separate parameters whose correlation is near 1 or -1."
 )
 

@@ -27,7 +27,7 @@ METRICS = columns(
 JUDGED = ("outside", "crashed", "within")
 """Words of verdicts, the worst first."""
 MEANS = {
-    "fit": "share of the measured motion that is explained, 100 at best",
+    "fit": "share of the measured motion that is explained: 100 at best, 0 as far off as its mean, below 0 farther",
     "rmse": "root mean square of measured minus predicted",
     "largest": "largest of measured minus predicted",
     "bias": "mean of measured minus predicted",
@@ -119,10 +119,19 @@ def explained(metrics: pd.DataFrame) -> str:
     for who, channel, value in fits.drop_duplicates("who")[["who", "channel", "value"]].itertuples(index=False):
         off = largest.get((who, channel), math.nan)
         size = "" if math.isnan(off) else f", off by up to {off:.3g}{unit_text(units[who, channel])}"
-        told.setdefault(f"{value:.3g} % of {channel}{size}", []).append(who)
+        told.setdefault(f"{_share(value)} {channel}{size}", []).append(who)
     head = "Explained least" if fits["channel"].nunique() > 1 else "Explained"
     lines = [f"{text} ({', '.join(whom)})" for text, whom in told.items()]
     return f"{head}: {'; '.join(lines)}." if lines else ""
+
+
+def _share(fit: float) -> str:
+    """How much of a motion is explained, in words where that is less than nothing."""
+    if fit >= 0.0:
+        return f"{fit:.3g} % of"
+    if math.isinf(fit):
+        return "nothing, since nothing was measured to move, of"
+    return f"nothing, since it is off {1.0 - fit / 100.0:.2g} times as much as the measured mean would be, of"
 
 
 def judged(metrics: pd.DataFrame) -> str:

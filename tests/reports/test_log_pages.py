@@ -29,8 +29,9 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Results:
 def test_a_log_is_measured_and_no_truth(found: Results) -> None:
     (case,) = found.cases
     page = case_page.case_page(found, case)
-    assert "Compared with: measurement (" in page.lead
-    assert page.lead.endswith("rig.csv).")
+    assert page.about.endswith("Compared with measurement.")
+    assert page.sources.startswith("measurement (")
+    assert page.sources.endswith("rig.csv).")
     assert [one["shown"] for one in page.engines] == ["measured", "reference:compiled"]
     names = [section.name for section in page.sections]
     assert "audit" not in names, "nothing is audited where a log leads"
@@ -51,9 +52,10 @@ def test_a_difference_that_no_sensor_resolves_takes_no_room(found: Results) -> N
 
 
 @pytest.mark.parametrize("tier", Tier)
-def test_a_truth_is_named_by_its_letter(tier: Tier) -> None:
-    lead = case_page._lead({"title": "a ball.", "tier": tier.value, "source": "two that agree."})
-    assert lead == f"A ball. Truth {tier.value[0]}: {tier.value[2:]} (two that agree)."
+def test_a_truth_is_named_in_plain_words_and_by_its_letter(tier: Tier) -> None:
+    about, sources = case_page._about({"title": "a ball.", "tier": tier.value, "source": "two that agree."})
+    assert about == f"A ball. Compared with {case_page.PLAINLY[tier]}."
+    assert sources == f"Truth {tier.value[0]}: {tier.value[2:]} (two that agree)."
 
 
 def test_provenance_has_a_line_for_every_fact_and_none_for_nothing(found: Results) -> None:

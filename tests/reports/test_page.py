@@ -255,9 +255,12 @@ def test_a_page_stays_small(out: Path) -> None:
     assert (out / CASE).stat().st_size < LIMIT
 
 
-def test_the_verdict_table_comes_first_and_is_complete(out: Path) -> None:
+def test_a_case_begins_with_what_is_off_and_its_motion_and_its_verdicts_are_complete(out: Path) -> None:
     text = (out / CASE).read_text()
-    assert text.index('class="verdicts"') < text.index('class="player"') < text.index("<figure>")
+    order = ['class="lead first"', '<details class="lead">', 'class="engines"', 'class="player"', 'class="inside"',
+             'class="matrix"', 'class="verdicts"', "<figure>"]  # fmt: skip
+    places = [text.index(part) for part in order]
+    assert places == sorted(places)
     rows = json.loads((out / "verdicts.json").read_text())["rows"]
     assert text.count("<tr data-verdict=") == len(rows)
     assert "It is not installed." in text

@@ -16,9 +16,9 @@ from crossbody.engines import load as load_engine
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.measuring.truth import TRUTH
-from crossbody.reports.pages.figures import MOST_SIGNALS, carrying, force, motion, note, penetration, plots
+from crossbody.reports.pages.figures import MOST_SIGNALS, carrying, chattering, force, motion, note, penetration, plots
 from crossbody.reports.pages.friction import hysteresis
-from crossbody.reports.pages.sheet import broken, off_scale
+from crossbody.reports.pages.sheet import Sheet, broken, off_scale
 from crossbody.reports.runs import study
 from crossbody.reports.runs.choice import Pick
 from crossbody.reports.runs.jobs import run_case
@@ -366,3 +366,59 @@ def test_coordinates_at_rest_are_named_and_not_drawn(run: Trajectory, seed: int)
     assert told.endswith(f"At rest in every run, to within the limit: {named}." if named else "ends is drawn.")
     alone = [replace(one, run=replace(one.run, q=0.0 * q), truth=None) for one in traces]
     assert plots("motion", alone, limits={"position": {limit: "limit"}}), "what rests as a whole is the motion"
+
+
+def comb(run: Trajectory, seed: int, periods: int) -> Trajectory:
+    """The run with a force that opens and closes so often, of sizes at random."""
+    rng, t = np.random.default_rng(seed), np.linspace(0.0, run.t[-1], 40 * periods + 1)
+    sizes = np.append(rng.uniform(0.2, 1.4, periods), 0.0) * np.nanmax(run.lam)
+    at = np.arange(len(t)) // 40
+    lam = np.where(np.arange(len(t)) % 40 < rng.integers(2, 30), sizes[at], 0.0)[:, None]
+    shaped = {name: np.zeros((len(t), getattr(run, name).shape[1])) for name in ("q", "v", "energy")}
+    mode = np.where(lam > 0.0, Mode.CONTACT, Mode.FREE).astype(np.int8)
+    return replace(run, t=t, lam=lam, gap=-1e-4 * lam, mode=mode, events=(), ledger=None, **shaped)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_force_that_is_a_comb_is_drawn_from_least_to_largest_below_the_truth_and_by_its_mean(
+    run: Trajectory, seed: int
+) -> None:
+    """The mean has the impulse, whose rate a reader compares with the truth's force."""
+    often = comb(run, seed, 300)
+    traces = [trace(run), trace(often, "fake")]
+    figure = force(traces)
+    lines = [line for line in figure["data"] if line["yaxis"] == "y"]
+    assert [line["meta"] for line in lines] == ["fake:p", TRUTH, "fake:p"], "nothing lies over the truth but a line"
+    band, _, mean = lines
+    assert band["fill"] == "toself"
+    x, y = numbers(band["x"]), numbers(band["y"])
+    half, lam = len(x) // 2, often.lam[:, 0]
+    for start, end, high, low in zip(x[:half:2], x[1:half:2], y[:half:2], y[half:][::-1][::2], strict=True):
+        part = lam[(often.t >= start) & (often.t <= end)]
+        assert low - 1e-6 <= part.min() <= part.max() <= high + 1e-6 * lam.max()
+    assert y.max() == pytest.approx(lam.max(), rel=1e-6)
+    x, y = numbers(mean["x"]), numbers(mean["y"])
+    assert np.sum(y[:-1] * np.diff(x)) == pytest.approx(np.trapezoid(lam, often.t), rel=1e-4)
+    assert "least to largest of fake:p" in figure["layout"]["title"]["text"]
+    (section,) = hysteresis(traces)
+    first, second = section.plots[0].figure["data"]
+    assert (first["meta"], first["mode"], second["meta"], second["mode"]) == ("fake:p", "markers", TRUTH, "lines")
+    assert len(numbers(first["x"])) <= 400
+    assert set(numbers(first["y"])) <= set(lam.astype(np.float32).astype(float))
+
+
+@pytest.mark.parametrize("periods", [1, 5, 20])
+def test_a_force_of_a_few_periods_is_drawn_as_it_is(run: Trajectory, periods: int) -> None:
+    some = comb(run, 0, periods)
+    assert not chattering([trace(run), trace(some, "fake")], 0)
+    assert chattering([trace(comb(run, 1, 300)), trace(comb(run, 2, 300), "fake")], 0) == {}, "as the truth's"
+
+
+def test_of_several_limits_narrower_than_a_line_one_number_is_said_of_each_quantity(run: Trajectory) -> None:
+    sheet = Sheet(["depth a\n[m]", "depth b\n[m]"], "Depths", 100)
+    for row in (0, 1):
+        sheet.line(trace(run), row, run.q[:, 0])
+        for half, name in ((1e-6, "limit"), (6.7e-8, "limit"), (1e-8, "limit of fake:p"), (1e-7, "limit")):
+            sheet.band(row, half, name)
+    assert "Limits narrower than a line: depth a, depth b ±6.7e-08 m (limit)" in sheet.done()["layout"]["title"]["text"]
+    assert "fake" not in sheet.done()["layout"]["title"]["text"]

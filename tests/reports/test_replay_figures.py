@@ -8,6 +8,7 @@ import pytest
 from unpacked import numbers
 
 from crossbody.reports.replay import figure
+from crossbody.reports.sections.replay import explained
 
 NAMES = ["I1", "k1", "<b>"]
 
@@ -35,7 +36,7 @@ def test_a_profile_is_the_rise_of_the_cost_and_shades_its_interval(random: np.ra
         mine, n = rows[rows["name"] == name], "" if k == 0 else str(k + 1)
         assert (line["xaxis"], line["yaxis"]) == (f"x{n}", f"y{n}")
         np.testing.assert_allclose(numbers(line["x"]), mine["value"])
-        np.testing.assert_allclose(numbers(line["y"]), mine["cost"] - 1.0, rtol=1e-6)
+        np.testing.assert_allclose(numbers(line["y"]), 100.0 * (mine["cost"] - 1.0), rtol=1e-6)
         assert spans(drawn["layout"]["shapes"], "x")[f"x{n}"] == (estimates["low"][k], estimates["high"][k])
         assert drawn["layout"][f"xaxis{n}"]["title"]["text"] == f"{name.replace('<', '&lt;')} [kg]"
         assert "matches" not in drawn["layout"][f"xaxis{n}"]
@@ -100,6 +101,10 @@ def test_correlations_of_residuals_stand_in_their_band(random: np.random.Generat
         "value": random.uniform(-1.0, 1.0, 10), "band": np.repeat([0.1, 0.2], 5),
     })  # fmt: skip
     drawn = figure.correlation(rows)
+    assert "averages" in drawn["layout"]["xaxis2"]["title"]["text"], "an earlier run does not say how long they are"
+    timed = figure.correlation(rows.assign(lag_s=0.02 * rows["lag"]))
+    assert timed["layout"]["xaxis2"]["title"]["text"] == "lag [s]"
+    np.testing.assert_allclose(numbers(timed["data"][1]["x"]), 0.02 * np.arange(5))
     assert spans(drawn["layout"]["shapes"], "y") == {"y": (-0.1, 0.1), "y2": (-0.2, 0.2)}
     np.testing.assert_allclose(numbers(drawn["data"][1]["y"]), rows["value"][5:], rtol=1e-6)
 
@@ -113,3 +118,37 @@ def test_the_largest_residual_that_is_within_is_drawn_on_both_sides(random: np.r
     drawn = figure.residual(rows, {}, limits={"th1": 0.5, "th3": 0.25})
     lines = [(one["yref"], one["y0"]) for one in drawn["layout"]["shapes"] if one.get("name") == "limit"]
     assert sorted(lines) == [("y", -0.5), ("y", 0.5), ("y3", -0.25), ("y3", 0.25)]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_profile_that_is_a_parabola_meets_the_dashed_line_at_the_ends_of_its_interval(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    at, half, bend = rng.normal(), rng.uniform(0.1, 2.0), 10.0 ** rng.uniform(-3.0, 3.0)
+    estimates = pd.DataFrame({"name": ["k"], "unit": "N", "low": [at - half], "high": [at + half]})
+    values = at + half * np.linspace(-1.5, 1.5, 9)
+    rows = pd.DataFrame({"name": "k", "value": values, "cost": 1.0 + bend * (values - at) ** 2})
+    (dashed,) = (one["y0"] for one in figure.profile(rows, estimates)["layout"]["shapes"] if one["type"] == "line")
+    assert dashed == pytest.approx(100.0 * bend * half**2)
+
+
+@pytest.mark.parametrize("sigma", [1e-9, 0.25])
+def test_the_noise_is_seen_or_said_however_small_it_is(sigma: float, random: np.random.Generator) -> None:
+    for draw in (figure.motion, figure.residual):
+        title = draw(windows(random), {"th1": sigma})["layout"]["title"]["text"]
+        assert f"th1 ±{2.0 * sigma:.2g} rad" in title
+    (band,) = (one for one in figure.residual(windows(random), {"th1": sigma})["layout"]["shapes"] if "yref" in one)
+    assert band["line"]["width"] >= 1.0, "a band without a height is a line"
+
+
+@pytest.mark.parametrize("fit", [-np.inf, -92.8, -1.0, 0.0, 73.0])
+def test_what_explains_less_than_nothing_is_said_in_words(fit: float) -> None:
+    rows = [("e:p", "fit", "rz", fit, "%"), ("e:p", "fit", "x", 99.0, "%"), ("e:p", "largest", "rz", 0.5, "rad")]
+    said = explained(pd.DataFrame(rows, columns=["who", "metric", "channel", "value", "unit"]))
+    assert said.endswith("rz, off by up to 0.5 rad (e:p).")
+    if fit >= 0.0:
+        assert f"{fit:.3g} % of rz" in said
+    elif np.isinf(fit):
+        assert "nothing was measured to move, of rz" in said
+    else:
+        assert "-" not in said
+        assert f"{1.0 - fit / 100.0:.2g} times as much as the measured mean" in said

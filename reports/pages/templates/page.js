@@ -68,11 +68,18 @@ const crossbody = (() => {
     const target = document.getElementById(id);
     if (pages.length > 1) pages.forEach((each) => { each.hidden = each !== page; });
     if (engine && named) {
-      const select = page.querySelector('select[data-filter="engine"]');
+      const [select, show] = ["engine", "verdict"].map((name) => page.querySelector(`select[data-filter="${name}"]`));
       if (select && [...select.options].some((option) => option.value === engine)) {
         select.value = engine;
         page.querySelector('input[data-filter="words"]').value = metric || "";
-        select.dispatchEvent(new Event("change"));
+        // Of the rows that can be shown as many as it takes to see what was asked for.
+        const seen = () => [...show.closest("section").querySelectorAll("tbody tr:not([hidden])")]
+          .some((row) => !metric || row.cells[2].textContent === metric);
+        for (const kind of [show.value, "judged", "all"]) {
+          show.value = kind;
+          select.dispatchEvent(new Event("change"));
+          if (seen()) break;
+        }
       }
     }
     if (target && (engine || pages.length > 1)) target.scrollIntoView();
@@ -80,6 +87,10 @@ const crossbody = (() => {
     crossbody.tell("page");
   };
   addEventListener("hashchange", go);
+  addEventListener("click", (event) => { // the same cell again, after the filter was changed
+    const cell = event.target.closest?.(".cell a");
+    if (cell && cell.hash && cell.href === location.href) go();
+  });
   addEventListener("load", go);
 })();
 
@@ -95,6 +106,7 @@ const crossbody = (() => {
       const mine = engine ? row.dataset.engine === engine : crossbody.shown(row.dataset.engine);
       row.hidden = !(wanted && mine && words.every((word) => row.textContent.toLowerCase().includes(word)));
     });
+    section.querySelector("[data-none]").hidden = Boolean(section.querySelector("tbody tr:not([hidden])"));
   };
   crossbody.each('[data-filter="verdict"]', (select) => {
     const section = select.closest("section");
@@ -104,6 +116,11 @@ const crossbody = (() => {
       field.addEventListener("change", filter);
     });
     crossbody.on("engines", filter);
+    section.querySelector("[data-show-rows]").addEventListener("click", () => {
+      section.querySelectorAll("[data-filter]").forEach((field) => { field.value = field.dataset.filter === "verdict" ? "all" : ""; });
+      if (!section.querySelector("tbody tr[data-engine]:not([hidden])")) crossbody.hidden.clear();
+      crossbody.tell("engines");
+    });
     filter();
   });
   crossbody.each('[data-filter="lines"]', (field) => field.addEventListener("input", () => {
@@ -111,6 +128,7 @@ const crossbody = (() => {
     field.closest("section").querySelectorAll("tbody tr").forEach((row) => {
       row.hidden = !row.querySelector("th").textContent.toLowerCase().includes(word);
     });
+    field.closest("section").querySelector("[data-none]").hidden = Boolean(field.closest("section").querySelector("tbody tr:not([hidden])"));
   }));
 })();
 
@@ -141,8 +159,9 @@ const crossbody = (() => {
   crossbody.each(".matrix", columns);
   crossbody.on("engines", () => document.querySelectorAll(".matrix").forEach(columns));
   const rows = (row) => { row.hidden = !crossbody.shown(row.dataset.engine.replace(/:$/, "")); };
-  crossbody.each("details.table tr[data-engine]", rows);
-  crossbody.on("engines", () => document.querySelectorAll("details.table tr[data-engine]").forEach(rows));
+  const OWN = ":is(details.table tr, .causes li)[data-engine]";
+  crossbody.each(OWN, rows);
+  crossbody.on("engines", () => document.querySelectorAll(OWN).forEach(rows));
   crossbody.each("[data-show-all]", (button) => button.addEventListener("click", () => {
     crossbody.hidden.clear();
     crossbody.tell("engines");
@@ -181,7 +200,7 @@ const crossbody = (() => {
   addEventListener("beforeprint", () => {
     kept = root.dataset.theme;
     root.dataset.theme = "light";
-    opened = [...document.querySelectorAll("details:is(.table, .fold):not([open])")];
+    opened = [...document.querySelectorAll("details:is(.table, .fold, .lead):not([open])")];
     opened.forEach((each) => { each.open = true; });
     crossbody.tell("theme");
   });

@@ -7,6 +7,7 @@
   const SHARP = 2; // device pixels a pixel at most; more cost time and are not seen in what moves
   const SAID = 100; // time between two readouts while it plays, ms: each has the page laid out and painted
   const [NARROW, BARS] = [560, 48]; // width of a picture whose bars would lie over the scene, and their height, pixels
+  const EDGE = 10; // between an arrow and the border of its picture, pixels
   const FAR = 4; // times its own size that a mechanism goes before it is followed
   const shortNumber = (x) => String(Number(x.toPrecision(3)));
 
@@ -20,8 +21,8 @@
       return { ...track, width: track.poses.length / n, pushes: track.arrows.length / n };
     });
     const find = (name) => root.querySelector(`[data-${name}]`);
-    const [play, clock, readout, speed, view, forces, longer, axes, before, after, differences, follow] =
-      ["play", "clock", "readout", "speed", "view", "forces", "longer", "axes", "before", "after", "differences", "follow"].map(find);
+    const [play, clock, readout, event, speed, view, forces, longer, axes, before, after, differences, whose, follow] =
+      ["play", "clock", "readout", "event", "speed", "view", "forces", "longer", "axes", "before", "after", "differences", "whose", "follow"].map(find);
     const canvas = root.querySelector("canvas");
     const g = canvas.getContext("2d", { alpha: false }); // what is opaque costs less to lay into the page
     let [now, running, last, said, turn, tilt, zoom] = [0, false, 0, -Infinity, 0.6, 0.35, 1];
@@ -49,20 +50,17 @@
       const row = share < 1 ? low : high; // what has been, so that no force is seen before its touch
       return { pose: mix, pushes: track.arrows.subarray(row * track.pushes, (row + 1) * track.pushes) };
     };
-    const larger = () => (differences && lead ? Number(differences.value) : 1);
+    const larger = (track) => (differences && lead && (!whose.value || whose.value === track.name) ? Number(differences.value) : 1);
     // A pose with its difference to the truth's made larger: of bodies with shapes where they are, not how they are turned.
     const pose = (track, t) => {
-      const [mine, factor] = [at(track, t), larger()];
+      const [mine, factor] = [at(track, t), larger(track)];
       if (factor === 1 || track === lead) return mine;
       const true_ = at(lead, t).pose;
       const moved = (k) => true_(k) + factor * (mine.pose(k) - true_(k));
       return { ...mine, pose: (k) => (solids && k % 9 > 2 ? mine.pose(k) : moved(k)) };
     };
-    // Whose motion the view has room for: the truth's, for a run that diverged would shrink it; and of larger differences all.
-    const fitted = () => {
-      const shown = larger() > 1 ? tracks.filter((track) => crossbody.shown(track.name)) : [];
-      return shown.length ? shown : lead ? [lead] : tracks;
-    };
+    // Whose motion the view has room for: the truth's, for a run that diverged, or differences made larger, would shrink it.
+    const fitted = lead ? [lead] : tracks;
     const around = (points) => {
       const found = [0, 1, 2].map(() => [Infinity, -Infinity]);
       for (const p of points) {
@@ -76,7 +74,7 @@
       s.circle ? [Math.hypot(s.circle[0], s.circle[1]) + s.circle[2]] : s.points.map((p) => Math.hypot(...p)))));
     // Points that bodies reach at one instant.
     const reached = (track, t) => {
-      const posed = pose(track, t).pose;
+      const posed = at(track, t).pose;
       if (solids) return moving.flatMap((solid) => crossbody.solids.extent(posed, solid));
       return Array.from({ length: track.width / 3 }, (_, k) => [posed(3 * k), posed(3 * k + 1), posed(3 * k + 2)]).flatMap((p, k) =>
         (space ? [p] : [-1, 1].map((side) => [p[0] + side * reach[k], p[1] + side * reach[k]])));
@@ -84,7 +82,7 @@
     const spans = () => around([
       ...fixed.flatMap((solid) => solid.points), ...stage.still.flatMap((shape) => shape.points || []),
       ...stage.threads.map((thread) => thread.slice(0, 2)),
-      ...fitted().flatMap((track) => {
+      ...fitted.flatMap((track) => {
         const step = Math.max(1, Math.floor(track.t.length / (solids ? 40 : 150)));
         return [...track.t].filter((_, i) => i % step === 0).flatMap((t) => reached(track, t));
       }),
@@ -92,11 +90,10 @@
     // Diameter seen from above, and height: what a camera that goes round and over it must have room for.
     const across = ([x, y, z]) => [Math.hypot(x[1] - x[0], y[1] - y[0]), z[1] - z[0]];
     const centre = (boxes) => boxes.map(([a, b]) => (a + b) / 2);
-    let range, middle, size;
-    const fit = () => { range = spans(); };
-    fit();
+    const range = spans();
+    let middle, size;
     // What the bodies span at one instant: one that goes far is followed, or nobody would see it.
-    const standing = (t) => around(fitted().flatMap((track) => reached(track, t)));
+    const standing = (t) => around(fitted.flatMap((track) => reached(track, t)));
     const aim = () => {
       const boxes = follow?.checked ? standing(now) : range;
       middle = centre(boxes);
@@ -138,6 +135,20 @@
       }
       g.stroke();
     };
+    // The part of an arrow that is within its picture; nothing where it begins outside.
+    const inside = (from, to, frame) => [0, 1].reduce((part, k) => {
+      const [low, high] = [frame[k] + EDGE, frame[k] + frame[k + 2] - EDGE];
+      if (!(from[k] >= low && from[k] <= high)) return 0;
+      return to[k] < low ? Math.min(part, (from[k] - low) / (from[k] - to[k])) : to[k] > high ? Math.min(part, (high - from[k]) / (to[k] - from[k])) : part;
+    }, 1);
+    // A bar across an arrow that is shorter than its force is large.
+    const bar_ = (from, to) => {
+      const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+      const [x, y, long] = [from[0] + 0.4 * dx, from[1] + 0.4 * dy, Math.hypot(dx, dy) / 6];
+      if (long < 0.4) return;
+      trace([[x - dy / long, y + dx / long], [x + dy / long, y - dx / long]]);
+      g.stroke();
+    };
     const arrow = (from, to, hollow) => {
       const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
       const length = Math.hypot(dx, dy);
@@ -161,7 +172,8 @@
       g.fill();
     };
     // Forces, or impulses as hollow arrows; the typical largest of them is drawn as long as 0.28 of the height.
-    const arrows = (to, h, largest, values, hollow) => {
+    const arrows = (to, frame, largest, values, hollow) => {
+      const h = frame[3];
       const n = stage.dimensions;
       for (let k = 0; k < values.length && largest; k += 2 * n) {
         const [point, force] = [values.subarray(k, k + n), values.subarray(k + n, k + 2 * n)];
@@ -169,7 +181,11 @@
         const unit = ((0.28 * h) / largest / (from[2] || 1)) * Number(longer.value);
         const long = Math.hypot(...force) * unit * from[2];
         const cut = long > 0.45 * h ? (0.45 * h) / long : 1;
-        arrow(from, to([...point].map((x, i) => x + force[i] * unit * cut)), hollow);
+        const end_ = to([...point].map((x, i) => x + force[i] * unit * cut));
+        const part = inside(from, end_, frame);
+        const tip = from.slice(0, 2).map((x, i) => x + part * (end_[i] - x));
+        arrow(from, tip, hollow);
+        if (cut * part < 1) bar_(from, tip);
       }
     };
     const paintSolids = (track, pose, to, ghost) => {
@@ -182,7 +198,7 @@
       crossbody.solids.bones(g, stage.bones, frames, to);
       if (axes.checked) crossbody.solids.axes(g, frames, to, 0.06 * Math.hypot(...size));
     };
-    const paint = (track, to, h, ghost) => {
+    const paint = (track, to, frame, ghost) => {
       const { pose: posed, pushes } = pose(track, now);
       g.strokeStyle = g.fillStyle = track.color;
       g.lineWidth = track.truth ? 4 : 1.8;
@@ -208,12 +224,12 @@
       g.setLineDash([]);
       if (!forces.checked) return;
       g.lineWidth = 2;
-      arrows(to, h, scene.force, pushes, false);
+      arrows(to, frame, scene.force, pushes, false);
       const each = track.struck.length ? track.blows.length / track.struck.length : 0;
       track.struck.forEach((t, i) => {
         if (now < t || now > t + fade) return;
         g.globalAlpha = 1 - (now - t) / fade;
-        arrows(to, h, scene.impulse, track.blows.subarray(i * each, (i + 1) * each), true);
+        arrows(to, frame, scene.impulse, track.blows.subarray(i * each, (i + 1) * each), true);
         g.globalAlpha = 1;
       });
     };
@@ -264,7 +280,7 @@
       if (view.value === "ghosts") {
         const to = camera(0, 0, box.width, box.height - (box.width < NARROW ? BARS : 0));
         still(to);
-        shown.forEach((track, i) => paint(track, to, box.height, i > 0));
+        shown.forEach((track, i) => paint(track, to, [0, 0, box.width, box.height], i > 0));
         bar(to, 12, box.height - 12, box.height);
       } else if (shown.length) {
         const columns = Math.max(1, Math.min(shown.length, Math.round(Math.sqrt((shown.length * box.width) / box.height))));
@@ -277,7 +293,7 @@
           g.clip();
           const to = camera(x, y, w, h);
           still(to);
-          paint(track, to, h, false);
+          paint(track, to, [x, y, w, h], false);
           g.fillStyle = colours.ink;
           g.font = "12px system-ui, sans-serif";
           g.fillText(track.name, x + 8, y + 15);
@@ -288,6 +304,37 @@
       said = last;
       readout.textContent = `t = ${now.toFixed(Math.max(0, 4 - Math.floor(Math.log10(end || 1))))} s`;
       clock.value = end ? (1000 * now) / end : 0;
+      const here = stops.find(({ t }) => Math.abs(t - now) <= close);
+      event.textContent = here && !running ? told(here) : "";
+      before.disabled = !stops.some(({ t }) => t < now - close);
+      after.disabled = !stops.some(({ t }) => t > now + close);
+    };
+    // Instants at which something happens in an engine that is shown: those of the truth, each with what happens in others
+    // within half a frame of it, and of all else what is within a frame is one.
+    const close = 1e-9 * (end || 1);
+    const instants = () => {
+      const shown = tracks.filter((track) => crossbody.shown(track.name));
+      const each = (track) => track.happens[0].map((t, i) => ({ t, who: track.name, what: track.happens[1][i] }));
+      const found = shown.filter((track) => track === lead).flatMap(each).map((one) => ({ t: one.t, all: [one] }));
+      const rest = shown.filter((track) => track !== lead).flatMap(each).sort((a, b) => a.t - b.t).filter((one) => {
+        const near = found.find(({ t }) => Math.abs(t - one.t) <= 0.5 * scene.frame);
+        near?.all.push(one);
+        return !near;
+      });
+      const own = [];
+      for (const one of rest) {
+        if (own.length && one.t - own.at(-1).t <= scene.frame) own.at(-1).all.push(one);
+        else own.push({ t: one.t, all: [one] });
+      }
+      return [...found, ...own].sort((a, b) => a.t - b.t);
+    };
+    let stops = instants();
+    crossbody.on("engines", () => { stops = instants(); });
+    const told = ({ all }) => {
+      const groups = new Map();
+      all.forEach(({ what, who }) => groups.set(what, (groups.get(what) || new Set()).add(who)));
+      const texts = [...groups].map(([what, whom]) => `${what} (${[...whom].slice(0, 2).join(", ")}${whom.size > 2 ? ` and ${whom.size - 2} more` : ""})`);
+      return texts.slice(0, 3).join("; ") + (texts.length > 3 ? `; and ${texts.length - 3} more` : "");
     };
     let wanted = false;
     const redraw = () => {
@@ -325,13 +372,11 @@
     }
     play.addEventListener("click", () => run(!running));
     clock.addEventListener("input", () => seek((clock.value / 1000) * end, true));
-    const close = 1e-9 * (end || 1);
-    const step = (found) => { if (found !== undefined) { run(false); seek(found, true); } };
-    before.addEventListener("click", () => step(scene.events.findLast((t) => t < now - close)));
-    after.addEventListener("click", () => step(scene.events.find((t) => t > now + close)));
-    differences?.addEventListener("change", fit);
-    crossbody.on("engines", fit);
-    [view, forces, longer, axes, differences, follow].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
+    const step = (found) => { if (found) { run(false); seek(found.t, true); } };
+    before.addEventListener("click", () => step(stops.findLast(({ t }) => t < now - close)));
+    after.addEventListener("click", () => step(stops.find(({ t }) => t > now + close)));
+    differences?.addEventListener("change", () => { whose.disabled = Number(differences.value) === 1; });
+    [view, forces, longer, axes, differences, whose, follow].filter(Boolean).forEach((field) => field.addEventListener("change", redraw));
     const look = (right, down, closer = 1) => {
       if (space) [turn, tilt] = [turn + right, Math.min(1.5, Math.max(-1.5, tilt + down))];
       zoom = Math.min(50, Math.max(0.2, zoom * closer));

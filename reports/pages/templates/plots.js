@@ -40,6 +40,7 @@
   // Lines over time, or over lags, are named at their ends, to the right of their plots, and marks of a cloud beside the
   // last of each engine; on a narrow screen, below the title.
   const [NARROW, TALL, ROOM] = [560, 12, 12]; // width of such a screen, height of a name, width of what leads to it, pixels
+  const [SAME, ROWS] = [2.5, 3]; // how near lines end that nobody tells apart, pixels, and rows that their names may take
   const STROKES = { dash: "7 4", dot: "2 3", dashdot: "7 3 2 3" };
   const SVG = Object.assign(document.createElement("div"), { innerHTML: "<svg></svg>" }).firstChild.namespaceURI;
   const drawing = (kind, given, ...inside) => {
@@ -76,15 +77,16 @@
     });
     box.before(key);
   };
+  const pen = document.createElement("canvas").getContext("2d");
   const named = (box, { data, layout }) => {
     const lines = data.filter(own);
     const timed = box.hasAttribute("data-time");
-    const [wide, pen] = [box.clientWidth >= NARROW, document.createElement("canvas").getContext("2d")];
+    const wide = box.clientWidth >= NARROW;
     pen.font = "11px system-ui, sans-serif";
     const room = (text) => ROOM + Math.ceil(pen.measureText(text).width);
-    const beside = (texts) => { layout.margin = { ...layout.margin, r: Math.min(Math.max(...texts.map(room)) + 8, 0.4 * box.clientWidth) }; };
+    const leave = (texts) => { layout.margin = { ...layout.margin, r: Math.min(Math.max(...texts.map(room)) + 8, 0.4 * box.clientWidth) }; };
     const engines = [...box.closest("[data-page]").querySelectorAll("[data-show]")].map((each) => `${each.dataset.show} until 0.555 s`);
-    if (timed && wide && engines.length) beside(engines); // one instant is at one place in all figures of a page
+    if (timed && wide && engines.length) leave(engines); // one instant is at one place in all figures of a page
     if (!lines.length) return null;
     if (!timed && !layout.meta) { // lines in a plane end anywhere, often on each other
       const known = lines.filter(({ meta }) => meta);
@@ -101,7 +103,7 @@
     }
     over.dataset.named = layout.meta || "ends";
     lines.forEach((line) => Object.assign(line, { showlegend: false, wide: room(line.title) }));
-    if (!marks && !(timed && engines.length)) beside(lines.map(({ title }) => title));
+    if (!marks && !(timed && engines.length)) leave(lines.map(({ title }) => title));
     return over;
   };
   // Where a line leaves its plot, pixels; nothing where it is not seen.
@@ -130,6 +132,48 @@
     });
     return groups.flatMap((group) => Array.from({ length: group[1] }, (_, k) => top(group) + (k + 0.5) * each));
   };
+  // Names of lines that end together, in rows that have room, each in its colour; of very many, how many there are.
+  const rows = (group, most) => {
+    const found = [];
+    pen.font = "11px system-ui, sans-serif";
+    for (const [line] of group) {
+      const longer = [...(found.at(-1) || []), line];
+      if (found.length && pen.measureText(longer.map(({ title }) => title).join(", ")).width <= most) found[found.length - 1] = longer;
+      else found.push([line]);
+    }
+    if (group.length < 2 || found.length <= ROWS) return found.map((some) => some.map((line) => [line.title, (line.line || line.marker).color]));
+    const others = group.filter(([{ title }]) => title !== "truth").length;
+    const kind = group.every(([{ meta }]) => meta) ? "engines" : "lines";
+    return [[[others < group.length ? `truth and ${others} ${kind}` : `${others} ${kind}`, "var(--ink)"]]];
+  };
+  const together = (ends) => {
+    const groups = [];
+    for (const one of ends) {
+      const group = groups.find(([[, at]]) => Math.abs(at[0] - one[1][0]) <= SAME && Math.abs(at[1] - one[1][1]) <= SAME);
+      if (group) group.push(one);
+      else groups.push([one]);
+    }
+    return groups;
+  };
+  const beside = (over, groups, [x, y, right], room) => {
+    const told = groups.flatMap((group) => rows(group, room).map((row, k) => ({ group, row, k })));
+    spread(told.map(({ group }) => group[0][1][1]), y._length).forEach((middle, i) => {
+      const { group, row, k } = told[i];
+      const [line, at] = group[0];
+      const height = y._offset + middle;
+      const text = drawing("text", { x: right + ROOM + 3, y: height + 4 });
+      row.forEach(([title, color], j) => {
+        const part = drawing("tspan", {}, title);
+        part.style.setProperty("--of", color);
+        text.append(...(j ? [", ", part] : [part]));
+      });
+      if (!k) {
+        over.append(drawing("path", { d: `M${x._offset + at[0]} ${y._offset + at[1]}L${right + ROOM} ${height}`, stroke: line.line.color }));
+        text.dataset.all = group.map(([{ title }]) => title).join("|");
+      }
+      over.append(text);
+    });
+  };
   const name = (box) => {
     const { over } = charts.get(box);
     const all = box._fullLayout;
@@ -153,13 +197,17 @@
         if (from < 0 || to - ROOM > x._length) return Infinity;
         return points.filter(([px, py]) => px > from && px < to && Math.abs(py - height) < TALL - 3).length;
       };
+      if (!inside) {
+        beside(over, together(ends), [x, y, right], all.width - right - ROOM - 6);
+        continue;
+      }
       spread(ends.map(([, at]) => at[1]), y._length).forEach((middle, k) => {
         const [{ title, wide, line, marker }, at] = ends[k];
         const { color } = line || marker;
-        const side = inside && covered(at[0], middle, wide, -1) < covered(at[0], middle, wide, 1) ? -1 : 1;
-        const [there, height] = [inside ? x._offset + at[0] + side * ROOM : right + ROOM, y._offset + middle];
+        const side = covered(at[0], middle, wide, -1) < covered(at[0], middle, wide, 1) ? -1 : 1;
+        const [there, height] = [x._offset + at[0] + side * ROOM, y._offset + middle];
         const text = drawing("text", { x: there + 3 * side, y: height + 4, "text-anchor": side < 0 ? "end" : "start" }, title);
-        if (inside) text.setAttribute("class", "inside");
+        text.setAttribute("class", "inside");
         text.style.setProperty("--of", color);
         over.append(drawing("path", { d: `M${x._offset + at[0]} ${y._offset + at[1]}L${there} ${height}`, stroke: color }), text);
       });

@@ -1,0 +1,145 @@
+"""What a case's page begins with, that every cell leads to its row, and that words are counted and explained once."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from html import unescape
+from pathlib import Path
+from types import SimpleNamespace
+
+import chromium
+import numpy as np
+import pytest
+from study_pages import page_of
+
+from crossbody.cases import load
+from crossbody.reports.judging.told import beyond, runs_of, sentence
+from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.pages import case_page
+from crossbody.reports.pages.html import BEYOND
+
+needs_chromium = pytest.mark.skipif(
+    chromium.binary() is None, reason="Chromium is not installed (Debian: apt-get install chromium)."
+)
+OFF = ("crashed", "outside", "expected-outside")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a ball, with one engine that is right and one that is off."""
+    case = load("bouncing_ball", "linear")
+    run = truth_of(case).trajectory
+    off = replace(run, q=run.q * (1 + 1e-3 * np.sin(run.t))[:, None])
+    given = [
+        SimpleNamespace(engine="fake", profile=name, run=lambda one=one: one)
+        for name, one in (("right", run), ("off", off))
+    ]
+    return page_of(case, tmp_path_factory.mktemp("verdicts") / "out", *given)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
+    opened = chromium.Browser(tmp_path_factory.mktemp("profile"))
+    yield opened
+    opened.close()
+
+
+def test_a_page_begins_with_the_sentence_of_its_own_rows(page: Path) -> None:
+    rows = json.loads((page.parent / "verdicts.json").read_text())["rows"]
+    said = sentence(runs_of(rows)).replace(" on bouncing_ball:linear", "")
+    assert "fake:off" in said
+    text = unescape(page.read_text())
+    lead = text[text.index('<p class="lead first">') :].partition("</p>")[0]
+    assert said in lead
+    assert "bouncing_ball:linear" not in lead, "which case it is stands above"
+
+
+def drawn(seed: int) -> list[Row]:
+    """Rows of three engines at random, with every word, some beyond a limit that nothing is judged by."""
+    rng, words = np.random.default_rng(seed), [word.value for word in Word]
+    return [
+        {"who": f"e{rng.integers(3)}:p", "metric": f"m{k}", "verdict": str(rng.choice(words)), "expected": None,
+         "value": float(rng.uniform(0.0, 2.0)), "limit": float(rng.choice([0.0, 1.0])), "why": f"why {rng.integers(2)}"}
+        for k in range(60)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_number_that_is_off_is_counted_once_and_explained_once(seed: int) -> None:
+    rows = drawn(seed)
+    assert dict(case_page._counted(rows)) == Counter(BEYOND if beyond(row) else row["verdict"] for row in rows)
+    off = Counter(
+        (row["who"], BEYOND if beyond(row) else row["verdict"], row["why"])
+        for row in rows if row["verdict"] in OFF or beyond(row)
+    )  # fmt: skip
+    causes = case_page._causes(rows)
+    assert len(causes) == len(off)
+    for cause in causes:
+        *names, last = cause["names"]
+        more = int(last.split()[0]) - 1 if last.endswith(" more") else 0
+        assert len(names) + 1 + more == off[cause["who"], cause["word"], cause["why"]]
+        assert len(names) < 7
+
+
+@pytest.mark.browser
+@needs_chromium
+def test_every_cell_leads_to_its_row_whatever_was_shown_before(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    browser.wait("document.readyState === 'complete' && document.querySelectorAll('.verdicts tbody tr[hidden]').length")
+    empty = browser.js("""(async () => {
+        const found = [];
+        const set = (name, value) => {
+            const field = document.querySelector(`[data-filter="${name}"]`);
+            field.value = value;
+            field.dispatchEvent(new Event("change"));
+        };
+        for (const kind of ["outside", "judged", "all"]) {
+            for (const cell of document.querySelectorAll("section[id$=glance] td a")) {
+                set("words", "nothing has this");
+                set("verdict", kind);
+                cell.click();
+                await new Promise((done) => setTimeout(done, 5));
+                const [engine, metric] = decodeURIComponent(cell.hash).split("~").slice(1);
+                const rows = [...document.querySelectorAll(".verdicts tbody tr:not([hidden])")];
+                const right = rows.length && rows.every((row) => row.dataset.engine === engine)
+                    && (!metric || rows.some((row) => row.cells[2].textContent === metric));
+                if (!right) found.push(`${kind}: ${cell.hash}`);
+            }
+        }
+        return [document.querySelectorAll("section[id$=glance] td a").length, found];
+    })()""")
+    assert empty[0] > 20
+    assert empty[1] == []
+    assert browser.complaints() == []
+
+
+@pytest.mark.browser
+@needs_chromium
+def test_an_empty_table_says_so_and_shows_all_when_it_is_asked(page: Path, browser: chromium.Browser) -> None:
+    browser.open(page)
+    none = "document.querySelector('section[id$=verdicts] [data-none]')"
+    browser.wait(f"{none}.hidden")
+    browser.js(
+        "(() => { const field = document.querySelector('[data-filter=words]'); field.value = 'nothing has this';"
+        " field.dispatchEvent(new Event('input')); })()"
+    )
+    assert not browser.js(f"{none}.hidden")
+    assert browser.js(f"{none}.textContent").startswith("No row is shown.")
+    browser.js("document.querySelector('[data-show-rows]').click()")
+    assert browser.js(f"{none}.hidden")
+    assert not browser.js("document.querySelectorAll('.verdicts tbody tr[hidden]').length")
+
+
+@pytest.mark.browser
+@needs_chromium
+@pytest.mark.parametrize(("width", "height"), [(1400, 900), (400, 900)])
+def test_the_picture_is_on_the_first_screen(page: Path, browser: chromium.Browser, width: int, height: int) -> None:
+    browser.open(page, width=width)
+    browser.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+    bottom = browser.js("document.querySelector('.player canvas').getBoundingClientRect().bottom")
+    assert bottom <= height
+    assert browser.js("document.querySelector('[data-play]').getBoundingClientRect().bottom") <= height
