@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
-from crossbody.cases.arrays import Floats
+from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.between import pieces
 from crossbody.reports.measuring.apart import errors
 from crossbody.reports.measuring.impulse import away
@@ -131,11 +131,18 @@ def _errors(truth: Truth, run: Trajectory, exact: Trajectory, case: Case, here: 
         return found
     off, t = errors(truth, run, exact, case)
     worst = np.max(off / scale_of(truth.trajectory, case), axis=1, initial=0.0)
-    np.maximum.at(found[:, 0], pieces(here, t), worst)
+    np.maximum.at(found[:, 0], pieces(here, t), _known(worst))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     rates = np.abs(run.v - exact.v)[smooth] / scale_of_rates(truth.trajectory, case)
-    np.maximum.at(found[:, 1], pieces(here, run.t)[smooth], np.minimum(np.max(rates, axis=1, initial=0.0), APART))
+    np.maximum.at(
+        found[:, 1], pieces(here, run.t)[smooth], np.minimum(_known(np.max(rates, axis=1, initial=0.0)), APART)
+    )
     return found
+
+
+def _known(sizes: Floats) -> Floats:
+    """Return sizes of errors; of what is no number, as of what is infinitely far off, no clock brings it nearer."""
+    return np.where(np.isnan(sizes), np.inf, sizes)
 
 
 def _least(parts: Floats) -> NDArray[np.bool_]:
@@ -147,7 +154,7 @@ def _least(parts: Floats) -> NDArray[np.bool_]:
     """
     ways = np.where((parts > 1.0).any(axis=3, keepdims=True), np.inf, parts)
     most, _ = _path(ways[..., 0], np.maximum)
-    bounds = np.unique(ways[..., 0][(ways[..., 0] >= most) & (ways[..., 0] <= 1.0)])
+    bounds = distinct(ways[..., 0][(ways[..., 0] >= most) & (ways[..., 0] <= 1.0)])
     told = []
     for bound in bounds[np.linspace(0, len(bounds) - 1, min(len(bounds), BOUNDS)).astype(np.intp)]:
         fast, _ = _path(np.where(ways[..., 0] <= bound, ways[..., 1], np.inf), np.maximum)

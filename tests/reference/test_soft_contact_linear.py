@@ -170,7 +170,7 @@ def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
     from crossbody.reports.commands.analyse import bode as command
 
     out = tmp_path / "out"
-    assert command("soft_contact", ["ks=50"], out, "crossbody bode soft_contact") == 0
+    assert command(["ks=50"], out, "crossbody bode soft_contact") == 0
     assert "grasp" in capsys.readouterr().out
     rows = json.loads((out / "bode.json").read_text())["rows"]
     assert len(rows) == 2 * 2 * bode.POINTS
