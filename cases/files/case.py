@@ -134,8 +134,8 @@ def changed(name: str, values: Floats, of: Sequence[Coordinate], given: Mapping[
         except ValueError:
             value = np.nan
         if entry.strip() not in free or not np.isfinite(value):
-            valid = f"NAME VALUE, finite, of {', '.join(free)}"
-            raise InvalidValue(f"{name}: {shown(part.strip())} is no number of an entry; valid: {valid}.")
+            valid = f"a finite number behind one of {', '.join(free)}"
+            raise InvalidValue(f"{name}: {shown(part.strip())} is not a name and its value; valid: {valid}.")
         found[free[entry.strip()]] = value
     return found
 

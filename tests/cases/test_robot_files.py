@@ -659,7 +659,7 @@ def test_a_start_is_given_by_the_names_of_coordinates_and_velocities(tmp_path: P
     for name, wrong in (
         ("start", "free qw 1"), ("start", "arm 1"), ("start", "left arm"), ("start", "left arm nan"), ("rate", "7"),
     ):  # fmt: skip
-        with pytest.raises(InvalidValue, match=f"{name}: .* is no number of an entry; valid: .*left arm"):
+        with pytest.raises(InvalidValue, match=f"{name}: .* is not a name and its value; valid: .*left arm"):
             cases.load(str(path), **{name: wrong})
 
 
