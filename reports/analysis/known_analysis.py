@@ -29,8 +29,7 @@ from crossbody.reports.analysis import bode, numbers
 from crossbody.reports.analysis.counterparts import compared
 from crossbody.reports.analysis.loci import limits, root_locus
 from crossbody.reports.analysis.places import Place, places
-from crossbody.reports.judging.asked import rows_of
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Asked, Found, unlike_by
 from crossbody.reports.judging.verdict import Word
 
 MASS, SPRING, DRAG, GRAVITY, GEAR = 1.5, 60.0, 3.0, 9.81, 0.7
@@ -38,23 +37,13 @@ MASS, SPRING, DRAG, GRAVITY, GEAR = 1.5, 60.0, 3.0, 9.81, 0.7
 EXACT, SOLVED = 1e-9, 1e-7
 """Part of a number by which sums in another order differ, and to which equations are solved and differentiated."""
 OMEGA = np.array([0.1, 3.0, 6.2, 6.5, 40.0, 900.0])
-Found = tuple[str, float, Range, str]
-Asked = tuple[str, str, float, float]
 
 
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    return tuple(
-        (name, value, (wanted, wanted), what)
-        for kind in (_weight, _responses, _ranks, _poles, _loci, _curves, _engines)
-        for name, what, value, wanted in rows_of(kind, _failed)
-        if not abs(value - wanted) <= SOLVED * max(abs(wanted), 1e-3)
-    )
-
-
-def _failed(why: str) -> Asked:
-    return "analysis", f"a model that ends in {why}", math.nan, 0.0
+    kinds = (_weight, _responses, _ranks, _poles, _loci, _curves, _engines)
+    return unlike_by(kinds, "analysis", "a model that ends in", SOLVED, 1e-3)
 
 
 def _rows(table: pd.DataFrame) -> list[dict[Any, Any]]:

@@ -19,33 +19,21 @@ from crossbody.reports.bench.headline import headline
 from crossbody.reports.bench.measure import COLUMNS, Rung, row_of
 from crossbody.reports.bench.order import orders
 from crossbody.reports.bench.skip import ratio
-from crossbody.reports.judging.asked import rows_of
+from crossbody.reports.judging.asked import Asked, Found, unlike_by
 from crossbody.reports.judging.known_answers import UNLIKE, answers
 from crossbody.reports.judging.made_up import MadeUp, case_of
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.runs.choice import Pick
 
 EXACT = 1e-9
 """Part of a number by which sums in another order differ."""
 SEED = 7
-Found = tuple[str, float, Range, str]
-Asked = tuple[str, str, float, float]
-"""Which number, of what, as it is and as it must be."""
 
 
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    return tuple(
-        (name, value, (wanted, wanted), what)
-        for kind in (_orders, _ratios, _medians, _errors, _cubics, _lost, _held)
-        for name, what, value, wanted in rows_of(kind, _failed)
-        if not abs(value - wanted) <= EXACT * max(abs(wanted), 1e-300)
-    )
-
-
-def _failed(why: str) -> Asked:
-    return "benchmark", f"tables that end in {why}", math.nan, 0.0
+    kinds = (_orders, _ratios, _medians, _errors, _cubics, _lost, _held)
+    return unlike_by(kinds, "benchmark", "tables that end in", EXACT, 1e-300)
 
 
 def _timed(engine: str, settings: Any, off: Any, ms: Any, **more: Any) -> pd.DataFrame:

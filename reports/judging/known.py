@@ -20,6 +20,7 @@ from crossbody.cases import installed
 from crossbody.cases.errors import OwnFault
 from crossbody.cases.sources import readable
 from crossbody.reference import code_store
+from crossbody.reports.judging.stored import versions
 from crossbody.reports.sources import SHOWN, code
 
 Found = tuple[str, float, tuple[float, float], str]
@@ -118,6 +119,6 @@ def _name(kept: str = RUNS, engine: str = "") -> str:
         installed.version("scipy"),
         str(debugging()),
         repr(sorted(installed.digests().items())),
-        repr(sorted(engines.load(engine).versions.items())) if engine else "",
+        versions(engine) if engine else "",
     )
     return code_store.named(kept, *depends)

@@ -23,17 +23,13 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Actuator, Body, Joint, Scene
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.equations import equations_of
-from crossbody.reports.judging.asked import rows_of
+from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.judging.audit import settings_kept
 from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.forces_of_scene import forces_against
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.run_verdicts import Entry, looser
 from crossbody.reports.judging.steps_taken import miscounted
 
-Found = tuple[str, float, Range, str]
-Asks = tuple[str, str, float, float, float]
-"""Audit, of what, its number, what that must be, and by how much it may be off."""
 STEP, STEPS, FALL = 0.01, 100, 1e-3
 """Of a made-up record, s, and their number; step of a ball that falls, s."""
 LITTLE, SOME = 1e-6, 0.01
@@ -43,16 +39,8 @@ LITTLE, SOME = 1e-6, 0.01
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return the audit, its number, least and most, and of what, where it is another one."""
-    return tuple(
-        (name, value, (wanted - within, wanted + within), what)
-        for kind in (_steps, _settings, _forces, _falls, _loose, _between)
-        for name, what, value, wanted, within in rows_of(kind, _failed)
-        if not abs(value - wanted) <= within
-    )
-
-
-def _failed(why: str) -> Asks:
-    return "audit", f"an engine, which ends in {why}", math.nan, 0.0, 0.0
+    kinds = (_steps, _settings, _forces, _falls, _loose, _between)
+    return unlike(kinds, "audit", "an engine, which ends in")
 
 
 def _record(count: int, dt: float) -> Trajectory:
@@ -63,7 +51,7 @@ def _record(count: int, dt: float) -> Trajectory:
     )  # fmt: skip
 
 
-def _steps() -> Iterator[Asks]:
+def _steps() -> Iterator[Within]:
     """Yield whether steps are told that are others than a setting says."""
     case, run = cases.load("bouncing_ball", "linear"), _record(STEPS, STEP)
     for times, told in ((1.0, False), (2.0, True), (1.1, True), (0.9, True), (0.5, True)):
@@ -73,7 +61,7 @@ def _steps() -> Iterator[Asks]:
     yield "steps", "one step that is twice as long", float(any(miscounted(case, {"dt": STEP}, long))), 1.0, 0.0
 
 
-def _settings() -> Iterator[Asks]:
+def _settings() -> Iterator[Within]:
     """Yield how many rows say that settings did not arrive."""
     used = {"rtol": 1e-9, "cone": "elliptic", "max_steps": 9}
     for what, own, told in (
@@ -93,7 +81,7 @@ def _cart(gain: float = 3.0, most: float = 5.0, damping: float = 0.4) -> Case:
     return case_of(Scene(bodies=(body,), joints=(rail,), actuators=(motor,)), name="cart", t_end=1.0)
 
 
-def _forces() -> Iterator[Asks]:
+def _forces() -> Iterator[Within]:
     """Yield how many rows say that equations have other forces than a scene."""
     case = _cart()
     more = 1.0 + LITTLE
@@ -148,7 +136,7 @@ class Falling(Engine):
         return Falls(case=case, settings={"dt": settings["dt"]}, more=self.more, late=self.old)
 
 
-def _falls() -> Iterator[Asks]:
+def _falls() -> Iterator[Within]:
     """Yield how many of its first steps are said to be wrong, and how many are looked at."""
     case = cases.load("bouncing_ball", "linear")
     theirs = engines.load("reference").prepare(case, "compiled").audit()
@@ -161,7 +149,7 @@ def _falls() -> Iterator[Asks]:
         yield "first steps", f"a ball that is {what}", float(sum(not row.ok for row in rows)), float(told), 0.0
 
 
-def _loose() -> Iterator[Asks]:
+def _loose() -> Iterator[Within]:
     """Yield by how much a tolerance widens limits."""
     case = cases.load("bouncing_ball", "linear")
     for rtol, wanted in ((1e-12, 1.0), (1e-9, 1.0), (1e-6, 1e3), (1e-4, 1e5)):
@@ -169,7 +157,7 @@ def _loose() -> Iterator[Asks]:
         yield "tolerance", f"rtol = {rtol:g}", looser(case, entry), wanted, 1e-9 * wanted
 
 
-def _between() -> Iterator[Asks]:
+def _between() -> Iterator[Within]:
     """Yield what stands between samples of a motion that is bent where its mode changes, whether told twice or not."""
     t = np.linspace(0.0, 1.0, 11)
     for what, at in (("once", t), ("twice", np.insert(t, 6, t[5]))):

@@ -25,11 +25,9 @@ from crossbody.cases.case import Law
 from crossbody.cases.control import Control
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Actuator, Body, Joint, Scene
-from crossbody.reports.judging.asked import rows_of
+from crossbody.reports.judging.asked import Found, rows_of
 from crossbody.reports.judging.known_steps import period
-from crossbody.reports.judging.planted import Range
 
-Found = tuple[str, float, Range, str]
 SPRING = (5.0, 20.0, 1.0)
 """a0, 1/s^2, and a2, 1/(m s)^2, of a cubic spring, and from where it is let go, m."""
 LOOSE, TIGHT = 1e-5, 1e-12

@@ -14,8 +14,8 @@ import numpy as np
 from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.made_up import case_of
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.measuring.truth import from_run
 
 END, SAMPLES = 1.0, 1001
@@ -26,7 +26,6 @@ EARLY, LATE, OFF = 1e-6, 2e-3, 1e-5
 SAME = 1e-6
 """What splines leave, and part of an answer by which it may differ."""
 G = 9.81
-Found = tuple[str, float, Range, str]
 
 
 @cache

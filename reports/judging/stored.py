@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from crossbody import engines
 from crossbody.cases import Case
 from crossbody.cases.defaults import limits_of
 
@@ -63,8 +64,6 @@ def repeated(case: Case, entry: Entry) -> frozenset[str]:
 
 def versions(engine: str) -> str:
     """Return the versions of an engine's packages in one line."""
-    from crossbody import engines
-
     return ", ".join(f"{name} {version}" for name, version in sorted(engines.load(engine).versions.items()))
 
 

@@ -179,7 +179,7 @@ def known_until(rows: Iterable[Row], end: float) -> tuple[float, str]:
         rows: of the case.
         end: its horizon, s, which is what is returned where the truth is known to its end.
     """
-    found = [(end * row["compared"], _why_short(row)) for row in rows if is_short(row)]
+    found = [(end * row["compared"], _short(row)[1]) for row in rows if is_short(row)]
     return min(found, default=(end, ""))
 
 
@@ -198,15 +198,15 @@ def _counted(within: int, ran: int, known: Sequence[str]) -> str:
 
 
 def _part(row: Row) -> str:
-    said = SHORT.search(row["why"])
+    until, why = _short(row)
     part = f"{row['compared']:.2g} of the horizon"
-    return f"{said[1]}, {part} ({said[2]})" if said else part
+    return f"{until}, {part} ({why})" if why else part
 
 
-def _why_short(row: Row) -> str:
-    """Why a truth is known no further; nothing where its row does not say."""
+def _short(row: Row) -> tuple[str, str]:
+    """Up to when a truth is known, and why no further; nothing where its row does not say."""
     said = SHORT.search(row["why"])
-    return said[2] if said else ""
+    return (said[1], said[2]) if said else ("", "")
 
 
 def _named(texts: Sequence[str]) -> str:

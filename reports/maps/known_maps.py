@@ -15,13 +15,10 @@ from typing import Any
 import pandas as pd
 
 from crossbody import cases
-from crossbody.reports.judging.asked import rows_of
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.maps.gapmap import COLUMNS, LARGEST_S, gap_map, summary
 from crossbody.reports.runs.choice import Pick
 
-Found = tuple[str, float, Range, str]
-Asks = tuple[str, str, float, float, float]
 POINTS = 21
 CLOSE, MADE = 1e-6, 0.02
 """What integrators leave; and by how much the most energy that is made is off its peak at so few gaps."""
@@ -30,19 +27,10 @@ CLOSE, MADE = 1e-6, 0.02
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of what, where it is another one."""
-    return tuple(
-        (name, value, (wanted - within, wanted + within), what)
-        for kind in (_runs, _summaries)
-        for name, what, value, wanted, within in rows_of(kind, _failed)
-        if not abs(value - wanted) <= within
-    )
+    return unlike((_runs, _summaries), "gap map", "sliders, which end in")
 
 
-def _failed(why: str) -> Asks:
-    return "gap map", f"sliders, which end in {why}", math.nan, 0.0, 0.0
-
-
-def _runs() -> Iterator[Asks]:
+def _runs() -> Iterator[Within]:
     rows = gap_map((2, 3), [Pick(engine="reference", profile="compiled")], POINTS)
     rows = rows[rows["machine"] == "level"]
     plain = cases.load("newtons_cradle", "sliders", n=2)
@@ -61,7 +49,7 @@ def _runs() -> Iterator[Asks]:
     yield "energy_created", "3 balls", float(three["energy_created"].max()), 1.0 / 6.0, MADE
 
 
-def _summaries() -> Iterator[Asks]:
+def _summaries() -> Iterator[Within]:
     """Yield what is said of a line that makes the most energy amid, is ideal from some gap on, and failed once."""
     told: list[dict[str, Any]] = [
         dict.fromkeys(COLUMNS, math.nan)

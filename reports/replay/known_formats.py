@@ -20,10 +20,8 @@ import numpy as np
 from crossbody import hw
 from crossbody.cases.arrays import Floats
 from crossbody.hw.reading.columns import parse_columns
-from crossbody.reports.judging.asked import rows_of
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found, rows_of
 
-Found = tuple[str, float, Range, str]
 Table = dict[str, Floats]
 ROWS, SEED, SCALE = 40, 11, -2.5
 """Of the table; by which its signal is scaled as it is read."""

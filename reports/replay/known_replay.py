@@ -28,12 +28,8 @@ from crossbody.hw.reading.stream import Rows, join
 from crossbody.hw.replaying import measures
 from crossbody.hw.windows import rates
 from crossbody.hw.windows.whiteness import autocorrelation, noise_level
-from crossbody.reports.judging.asked import rows_of
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found, Within, unlike
 
-Found = tuple[str, float, Range, str]
-Asked = tuple[str, str, float, float, float]
-"""Of what, which number, as it is, as it must be, and by how much it may be off."""
 EXACT, CLOSE = 1e-9, 1e-6
 """By which part sums in another order differ; and what an integrator at its tolerance, and a search, leave."""
 INERTIA, MASS, REACH, DRAG, STEP, SAMPLES = 2e-3, 0.2, 0.15, 4e-3, 0.01, 240
@@ -96,16 +92,8 @@ WALL = 0.5
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    return tuple(
-        (name, value, (wanted - within, wanted + within), what)
-        for kind in (_reading, _joined, _measured, _link, _noisy, _ball, _bounces, _impacts, _needed, _looked)
-        for name, what, value, wanted, within in rows_of(kind, _failed)
-        if not abs(value - wanted) <= within
-    )
-
-
-def _failed(why: str) -> Asked:
-    return "log", f"a log that ends in {why}", math.nan, 0.0, 0.0
+    kinds = (_reading, _joined, _measured, _link, _noisy, _ball, _bounces, _impacts, _needed, _looked)
+    return unlike(kinds, "log", "a log that ends in")
 
 
 def _turned(t: Floats, inertia: float = INERTIA) -> Floats:
@@ -141,7 +129,7 @@ def _link_log(late: float = 0.0, noise: float = 0.0) -> Log:
     return _read("\n".join(["clock,encoder,drive", *(",".join(map(repr, row)) for row in rows)]), LINK)
 
 
-def _reading() -> Iterator[Asked]:
+def _reading() -> Iterator[Within]:
     log, t = _link_log(), STEP * np.arange(SAMPLES, dtype=np.float64)
     pairs: tuple[tuple[str, Floats, Floats], ...] = (
         ("times", log.time, BEGINS + t), ("angles", log.channel("coordinates", "th1").values, _turned(t)),
@@ -161,7 +149,7 @@ def _reading() -> Iterator[Asked]:
     yield "log", "a height in mm", float(late.channel("coordinates", "height").values[1]), 2e-3, EXACT
 
 
-def _joined() -> Iterator[Asked]:
+def _joined() -> Iterator[Within]:
     """Yield what a signal with times of its own is at those of a log."""
     other = Rows(rows=np.arange(3), time=np.array([0.0, 1.0, 3.0]), values=(np.array([2.0, 4.0, -4.0]),))
     at = np.array([0.25, 1.0, 2.5])
@@ -172,7 +160,7 @@ def _joined() -> Iterator[Asked]:
         yield "log", "rows before a signal begins", float(lead), 0.0, 0.0
 
 
-def _measured() -> Iterator[Asked]:
+def _measured() -> Iterator[Within]:
     """Yield metrics of made-up numbers, a lag of parts of a sample, and the size of a noise."""
     draw = np.random.default_rng(3)
     y, yhat = draw.normal(size=(2, 50)) + 2.0
@@ -201,7 +189,7 @@ def _rows(found: Comparison) -> dict[str, float]:
     return {row.metric: row.value for row in found.rows()}
 
 
-def _link() -> Iterator[Asked]:
+def _link() -> Iterator[Within]:
     """Yield how far a replay of the link is from its log, and what is identified from it."""
     given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
     log = _link_log()
@@ -214,7 +202,7 @@ def _link() -> Iterator[Asked]:
         yield f"interval of {name}", "a link without noise", fit[name].high - fit[name].low, 0.0, 1e4 * CLOSE * wanted
 
 
-def _noisy() -> Iterator[Asked]:
+def _noisy() -> Iterator[Within]:
     """Yield deviations of what is identified of a link whose angles are noisy, beside those of linear least squares."""
     given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": 1.2 * INERTIA, "k1": DRAG}
     fit = hw.identify(_link_log(0.0, NOISE), "single_pendulum", ["I1"], parameters=given, restart=0.0, hold=0)
@@ -234,7 +222,7 @@ def _spread() -> float:
     return NOISE * math.sqrt(float(np.linalg.inv(slopes.T @ slopes)[0, 0]))
 
 
-def _ball() -> Iterator[Asked]:
+def _ball() -> Iterator[Within]:
     """Yield metrics of a ball whose windows start at what is measured late: ahead by g a d + g d^2/2 at the age a."""
     t = STEP * np.arange(round(FLIES / STEP) + 2)
     true = t - DELAY
@@ -264,7 +252,7 @@ def _ball() -> Iterator[Asked]:
     yield "windows_failed", "a prediction that failed once", one["windows_failed"], 1.0, 0.0
 
 
-def _bounces() -> Iterator[Asked]:
+def _bounces() -> Iterator[Within]:
     """Yield how late, and by how much weaker, the impacts of a prediction are than those that are measured."""
     t = STEP * np.arange(round(FLIES / STEP) + 2)
     text = "\n".join(["t,h", *(f"{a!r},1000.0" for a in t.tolist())])
@@ -298,7 +286,7 @@ def _fallen(t: Floats, hits: tuple[float, ...]) -> Floats:
     return bent[:, None]
 
 
-def _impacts() -> Iterator[Asked]:
+def _impacts() -> Iterator[Within]:
     """Yield when impacts are, and how strong, of a motion that is straight between them."""
     t, jumps = STEP * np.arange(62, dtype=np.float64), np.array([4.0, 3.0, 2.5])
     y: Floats = -SPEED * t + np.sum(
@@ -316,7 +304,7 @@ def _impacts() -> Iterator[Asked]:
         yield f"how much weaker impact {k} is", told, float(weaker), -1.0, EXACT
 
 
-def _needed() -> Iterator[Asked]:
+def _needed() -> Iterator[Within]:
     """Yield the torques that the motion of the link needs, away from their changes, and how well these are known."""
     given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
     found = hw.inverse(_link_log(), "single_pendulum", parameters=given, half=6, degree=4)
@@ -328,7 +316,7 @@ def _needed() -> Iterator[Asked]:
     yield "instants of torques", told, float(t[0]), 6.0 * STEP, EXACT
 
 
-def _looked() -> Iterator[Asked]:
+def _looked() -> Iterator[Within]:
     """Yield what is found of clocks that drop samples or stand still, and how wide the band of a white residual is."""
     even = STEP * np.arange(60, dtype=np.float64)
     for what, times, check, count in (

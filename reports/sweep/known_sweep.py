@@ -7,7 +7,6 @@ words. And an axis gives its ends and its middle.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
@@ -18,17 +17,13 @@ import numpy as np
 from crossbody import cases
 from crossbody.cases import Case, Outcome, Trajectory
 from crossbody.cases.trajectory import Ledger
-from crossbody.reports.judging.asked import rows_of
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.suites.axis import Levels, Linear, Log, Whole
 from crossbody.reports.sweep.execute import Tried, row
 from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, residual
 from crossbody.reports.sweep.spec import Spec
 
-Found = tuple[str, float, Range, str]
-Asks = tuple[str, str, float, float, float]
-"""Of what, of which run, the number, what it must be, and by how much it may be off."""
 OFF, LIMIT, EXACT = 1e-4, 1e-6, 1e-9
 """By which part a run is off; the largest error that its judge allows; and what sums in another order differ by."""
 
@@ -40,16 +35,7 @@ OPEN = 40.0
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of what, where it is another one."""
-    return tuple(
-        (name, value, (wanted - within, wanted + within), what)
-        for kind in (_errors, _accounts, _axes, _words)
-        for name, what, value, wanted, within in rows_of(kind, _failed)
-        if not abs(value - wanted) <= within
-    )
-
-
-def _failed(why: str) -> Asks:
-    return "sweep", f"a made-up run that ends in {why}", math.nan, 0.0, 0.0
+    return unlike((_errors, _accounts, _axes, _words), "sweep", "a made-up run that ends in")
 
 
 @cache
@@ -59,7 +45,7 @@ def _exact() -> tuple[Case, Trajectory]:
     return case, case.closed_form(instants(case.t_end))
 
 
-def _errors() -> Iterator[Asks]:
+def _errors() -> Iterator[Within]:
     """Yield the error of the exact motion, and of those that are off in all places, at their end, or late."""
     case, run = _exact()
     asked = Asked(limit=1.0, near=lambda: case)
@@ -77,7 +63,7 @@ def _errors() -> Iterator[Asks]:
     yield "error", "a speed at the end", at_the_end(case, run.q[-1], run.v[-1] + OFF * fast).value, OFF, EXACT
 
 
-def _accounts() -> Iterator[Asks]:
+def _accounts() -> Iterator[Within]:
     """Yield what is left open of energies that are drawn, by the largest that moved or was turned over."""
     _, run = _exact()
     draw, count = np.random.default_rng(7), len(run.t)
@@ -93,7 +79,7 @@ def _accounts() -> Iterator[Asks]:
     yield "residual", "an account that is open", residual(made), float(largest / scale), EXACT
 
 
-def _axes() -> Iterator[Asks]:
+def _axes() -> Iterator[Within]:
     """Yield values at the ends of axes, and amid them."""
     for axis, wanted in (
         (Linear(-1.0, 3.0), (-1.0, 1.0, 2.0)), (Log(1e-3, 1e5), (1e-3, 10.0, 1e3)), (Whole(2, 5), (2, 4, 5)),
@@ -103,7 +89,7 @@ def _axes() -> Iterator[Asks]:
             yield "axis", f"{type(axis).__name__} at {u:g}", float(axis.at(u)), float(must), EXACT * abs(must)
 
 
-def _words() -> Iterator[Asks]:
+def _words() -> Iterator[Within]:
     """Yield 1 where a run's word is another one than it must be, else 0."""
     case, exact = _exact()
     none = Ledger(contact=np.zeros((len(exact.t), 1)), input=np.zeros(len(exact.t)), dissipated=np.zeros(len(exact.t)))

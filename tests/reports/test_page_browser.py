@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -66,13 +65,6 @@ def whole(out: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(out, path / "out")
     site.write(path / "out", others=[*studies(path), ladder(path / "bench", "bouncing_ball:linear")], against=out)
     return path / "out"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    opened = chromium.Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 NEXT_FRAME = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"

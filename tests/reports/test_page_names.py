@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -62,13 +61,6 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         study.write(made, results, study.judge(results, {case.label: "crossbody run"}), {"command": "test", "time": ""})
         site.write(made)
     return out / "case-bouncing_ball.linear.html"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    opened = chromium.Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -66,13 +65,6 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         )
     ]
     return page_of(case, tmp_path_factory.mktemp("playback") / "out", *given)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    opened = chromium.Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 STEPS = """(async (way) => {

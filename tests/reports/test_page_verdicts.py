@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -39,13 +38,6 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for name, one in (("right", run), ("off", off))
     ]
     return page_of(case, tmp_path_factory.mktemp("verdicts") / "out", *given)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    opened = chromium.Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 def test_a_page_begins_with_the_sentence_of_its_own_rows(page: Path) -> None:
