@@ -59,10 +59,10 @@ class Truths:
 def errors(truth: Truth, run: Trajectory, case: Case) -> dict[str, float]:
     """Every part, the touches too many, and `error`: the larger of position and event times over the horizon.
 
-    A run that misses an event, or has one too many, has failed: its errors are infinite.
+    A run that misses a touch, or has one too many, has no finite error. Where nothing can touch none is missed.
     """
     touches = _measured("touch_count", truth, run, case) if run.outcome.ok else math.nan
-    if not run.outcome.ok or touches:
+    if not run.outcome.ok or abs(touches) > 0.0:
         return dict.fromkeys(("error", *PARTS), math.inf) | {"touches": touches}
     parts = {part: _measured(name, truth, run, case) for part, name in PARTS.items()}
     # Where nothing touches there are no times, without a position there is no error.

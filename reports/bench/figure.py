@@ -13,14 +13,15 @@ from crossbody.reports.figures.styles import Panels, look
 
 FLOOR = 1e-16  # least error that is drawn
 LABEL = 11  # height of the name of a rung, pixels
+CROSS = "a cross is a run that ended early or touches more or less often than the truth"
 MOST = 8
 """Names that fit side by side on a narrow screen; the distance of two is this part of the decades of all errors."""
 
 
 def work_precision(rows: pd.DataFrame) -> Figure:
-    """Log-log lines labelled with tolerance or step; a failed run is a cross at the right edge."""
+    """Log-log lines labelled with tolerance or step; a run without a finite error is a cross at the right edge."""
     cases = ", ".join(rows["case"].unique())
-    panels = Panels(f"Work against precision, {cases}; a cross is a run that failed", 560)
+    panels = Panels(f"Work against precision, {cases}; {CROSS}", 560)
     error = rows["error"].astype(float)
     finite = error[np.isfinite(error) & (error > 0.0)]
     decades = np.ptp(np.log10(finite.clip(lower=FLOOR))) if len(finite) else 0.0

@@ -37,6 +37,34 @@ def headline(rows: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(found, columns=COLUMNS)
 
 
+def summary(rows: pd.DataFrame) -> str:
+    """Say of a headline how often the compiled reference is faster, by how much, and how many reach no error."""
+    reached, best = rows[rows["ahead"].notna()], rows["ratio"].astype(float)
+    told = [f"The compiled reference is faster at every error in {_of(rows['ahead'] == 'yes', reached)}"]
+    if best.notna().any():
+        told.append(f" ({best.min():.3g} to {best.max():.3g} times at the engine's best error)")
+    behind = reached[reached["ahead"] == "no"]
+    if len(behind):
+        told.append(f"; not in {_named(behind)}")
+    if len(lost := rows[rows["ahead"].isna()]):
+        told.append(f". {len(lost)} {'reaches' if len(lost) == 1 else 'reach'} no error: {_named(lost)}")
+    return "".join(told) + "."
+
+
+def _of(part: pd.Series[bool], whole: pd.DataFrame) -> str:
+    return f"{int(part.sum())} of {len(whole)} comparison{'s' * (len(whole) != 1)}"
+
+
+def _named(rows: pd.DataFrame) -> str:
+    """Engines and profiles, each with its cases where there are several."""
+    several = rows["case"].nunique() > 1
+    who = rows.groupby(["engine", "profile"], sort=False)["case"]
+    return ", ".join(
+        f"{engine}:{profile}" + f" ({len(cases)} cases)" * (several and len(cases) > 1)
+        for (engine, profile), cases in who
+    )
+
+
 def _case(group: pd.DataFrame) -> Iterator[dict[str, Any]]:
     mine = (group["engine"] == REFERENCE[0]) & (group["profile"] == REFERENCE[1])
     ours = group[mine & np.isfinite(group["error"].astype(float))]

@@ -14,7 +14,7 @@ from crossbody.cases import CrossbodyError, InvalidValue, OutputError
 from crossbody.reports import layout, voice
 from crossbody.reports.bench import against as bench_against
 from crossbody.reports.bench import measure, scenes, skip, throughput
-from crossbody.reports.bench.headline import headline
+from crossbody.reports.bench.headline import headline, summary
 from crossbody.reports.commands.shared import check_answers, identity, key, print_rows, publish, where
 from crossbody.reports.runs import choice, files, output
 from crossbody.reports.runs.parts import Parts
@@ -75,7 +75,9 @@ def _part(path: Path) -> pd.DataFrame:
 
 
 def show(tables: Mapping[str, pd.DataFrame], out: Path) -> None:
-    """The tables in the terminal, and where the page is."""
+    """What the comparison comes to, the tables in the terminal, and where the page is."""
+    if len(tables.get("headline", ())) and not voice.as_json() and not voice.quiet():
+        click.echo(layout.told(summary(tables["headline"])))
     for name, table in tables.items() if not voice.told_as_json(tables) and not voice.quiet() else ():
         shown = table[SHOWN[name]] if name in SHOWN else table
         above = "case" if "case" in shown else ""

@@ -27,6 +27,8 @@ def gap_map(counts: Sequence[int], wanted: Sequence[str], points: int, out: Path
     publish(out, "gapmap", {"gapmap": rows}, provenance(command, points=points))
     lines = gapmap.summary(rows)
     if not voice.told_as_json({"gapmap": rows, "summary": lines}):
+        for sentence in gapmap.in_words(lines) if not voice.quiet() else ():
+            click.echo(layout.told(sentence))
         print_rows(lines.drop(columns="why"), heads={"at_s": "at s", "n": "balls"})
         for line in lines[lines["why"] != ""].to_dict(orient="records"):
             run = f"{line['n']} balls, {line['engine']}:{line['profile']}, {line['machine']}"

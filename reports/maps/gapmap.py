@@ -171,6 +171,24 @@ def summary(rows: pd.DataFrame, ideal: float = 1e-3) -> pd.DataFrame:
     return pd.DataFrame(found, columns=columns)
 
 
+def in_words(lines: pd.DataFrame) -> list[str]:
+    """Say of a summary who creates most energy at which gap, and from which gap on the pattern is ideal."""
+    told = []
+    for n, group in lines.groupby("n", sort=False):
+        if not (known := group[group["most"].notna()]).empty:
+            top = known.iloc[int(np.argmax(known["most"].astype(float)))]
+            ideal = group[group["ideal_from"].notna()]["ideal_from"].astype(float)
+            told.append(
+                f"{n} balls: {top['engine']}:{top['profile']} ({top['machine']}) creates most, "
+                f"{100.0 * float(top['most']):.3g} % of the energy brought in, at s = {float(top['at_s']):g}; "
+                f"{len(ideal)} of {len(group)} follow the ideal pattern"
+                + (f", all of these from s = {ideal.max():g} on." if len(ideal) else " at no gap.")
+            )
+    if failed := int(lines["failed"].sum()):
+        told.append(f"{failed} runs failed.")
+    return told
+
+
 def _line_summary(done: pd.DataFrame, ideal: float) -> dict[str, Any]:
     if not len(done):
         return {"most": math.nan, "at_s": math.nan, "at_touch": "", "ideal_from": math.nan}

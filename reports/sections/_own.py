@@ -108,7 +108,12 @@ def _bench(out: Path) -> tuple[Section, ...]:
         Plot(name=f"work-precision-{i}", figure=work_precision(group))
         for i, (_, group) in enumerate(rows.groupby("case", sort=False))
     ]
-    return (Section(name="bench", title="Run time against error", text=words.BENCH_TEXT, plots=plots, tables=tables),)
+    text = words.BENCH_TEXT
+    if _has(out, "headline") and len(lead := _rows(out, "headline")):
+        from crossbody.reports.bench.headline import summary
+
+        text = f"{summary(lead)} {text}"
+    return (Section(name="bench", title="Run time against error", text=text, plots=plots, tables=tables),)
 
 
 def _conformance(out: Path) -> tuple[Section, ...]:
@@ -160,8 +165,11 @@ def _stability(out: Path) -> Iterator[Plot]:
 def _stress(out: Path) -> Iterator[Section]:
     if not _has(out, "stress_summary"):
         return
+    from crossbody.reports.sweep.map import in_words
+
     table = _table("Runs by suite", words.SUITES, _rows(out, "stress_summary"), "stress")
-    yield Section(name="stress", title="Stress runs by suite", text=words.STRESS_TEXT, tables=(table,))
+    text = f"{in_words(_rows(out, 'stress'))} {words.STRESS_TEXT}" if _has(out, "stress") else words.STRESS_TEXT
+    yield Section(name="stress", title="Stress runs by suite", text=text, tables=(table,))
     if len(cells := _rows(out, "stress_map")):
         from crossbody.reports.maps.figure import stress_map
 

@@ -53,7 +53,7 @@ BODE_TEXT = (
 GROWTHS = columns(mode="Modes", kstar=("k* [cm/(s N)]", Kind.NUMBER), growth=("Growth [1/s]", Kind.NUMBER))
 BENCH_TEXT = (
     "Models are built and warm before they are timed; engines are interleaved; times are "
-    "medians with interquartile range. Failed runs are shown as crosses. An engine that follows "
+    "medians with interquartile range. Runs without a finite error are shown as crosses. An engine that follows "
     "another law is judged against the truth of that law. Compare ratios, since seconds depend "
     "on the machine. The whole call includes the Python call and the trajectory that it builds."
 )

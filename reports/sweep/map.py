@@ -11,6 +11,7 @@ import pandas as pd
 from crossbody.cases import Outcome
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.execute import REFUSED, SKIPPED
+from crossbody.reports.sweep.minimise import failures
 
 STABILITY = "stiffness"  # the suite whose grid is the map
 KNOBS = ("rtol", "dt")
@@ -35,6 +36,27 @@ def summary(rows: pd.DataFrame, times: pd.DataFrame | None = None) -> pd.DataFra
             about["seconds"] = float(wall.loc[group["index"]].sum()) / 1e3
         found.append(about)
     return pd.DataFrame(found)
+
+
+def in_words(rows: pd.DataFrame) -> str:
+    """Say how many runs end as they must, who does not and how, and the largest error that a truth knows."""
+    bad, judged = failures(rows), rows[rows["tier"] != ""]
+    ran = int((~rows["outcome"].isin([SKIPPED, REFUSED])).sum())
+    told = [f"{ran - len(bad)} of {ran} runs end at their horizon and within their limits"]
+    if len(bad):
+        each = bad.groupby(bad["engine"] + ":" + bad["profile"], sort=False)
+        told.append("; not " + "; not ".join(f"{len(own)} of {who}: {_ends(own)}" for who, own in each))
+    told.append(f". {len(judged)} had a truth")
+    if not math.isnan(worst := _worst(judged["error"])):
+        told.append(f", the largest error is {worst:.2g}")
+    return "".join(told) + "."
+
+
+def _ends(bad: pd.DataFrame) -> str:
+    """How runs that are not as they must be end, in words."""
+    early = outcomes(bad)
+    outside = int((bad["outcome"] == Outcome.FINISHED).sum())
+    return ", ".join(part for part in (early, f"outside {outside}" * (outside > 0)) if part)
 
 
 def outcomes(group: pd.DataFrame) -> str:

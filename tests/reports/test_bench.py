@@ -488,3 +488,17 @@ def test_no_line_leads_to_a_rung_that_failed(rows: pd.DataFrame) -> None:
         edge = set(numbers(line["x"]))
         assert len(edge) == 1
         assert edge.pop() > rows["error"][np.isfinite(rows["error"])].max()
+
+
+def test_where_nothing_can_touch_no_touch_is_missed() -> None:
+    """A bilateral row has no touches to count; every engine of that case once reached no error."""
+    case = cases.load("bouncing_ball", "bilateral", t_end=0.2)
+    run = engines.load("reference").prepare(case, "compiled", rtol=1e-8, samples=np.linspace(0.0, 0.2, 50)).run()
+    assert errors(truth_of(case), run, case)["error"] < 1e-5
+
+
+def test_one_run_has_no_spread() -> None:
+    case = cases.load("bouncing_ball", "linear", t_end=0.1)
+    rows = bench(case, [Pick(engine="reference", profile="compiled")], Effort(repeats=1, every=4))
+    assert set(rows["repeats"]) == {1}
+    assert rows["iqr_ms"].isna().all()
