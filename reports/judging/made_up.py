@@ -126,7 +126,7 @@ class MadeUp:
         return Trajectory(t=t, mode=mode, events=tuple(events), steps=len(t), ledger=ledger, **made)  # type: ignore[arg-type]
 
     def _contacts(self) -> list[Event]:
-        """Return contacts that end, one row after the other: in a blow in no time behind, or in a way below the surface."""
+        """Return contacts that end, one row after the other; behind each a blow, or a way below the surface."""
         random, rows, t_end = self.random, np.flatnonzero(self.case.law.touches).tolist(), self.case.t_end
         found: list[Event] = []
         ends = np.sort(random.uniform(0.05, 0.95, 2 * CONTACTS)) * t_end
