@@ -132,9 +132,8 @@ class MadeUp:
         ends = np.sort(random.uniform(0.05, 0.95, 2 * CONTACTS)) * t_end
         for k, (touch, release) in enumerate(ends.reshape(-1, 2).tolist() if rows else ()):
             row, settled = rows[k % len(rows)], touch + random.uniform(0.2, 0.8) * (release - touch)
-            modes, left = (Mode.FREE, Mode.COLLISION, Mode.CONTACT, Mode.FREE), release
-            if not k % 2:
-                modes, left = (*modes[:-1], Mode.BALLISTIC, Mode.FREE), 0.5 * (release + [*ends, t_end][2 * k + 2])
+            below, left = [Mode.BALLISTIC] * (k % 2 == 0), 0.5 * (release + [*ends, t_end][2 * k + 2])
+            modes = [Mode.FREE, Mode.COLLISION, Mode.CONTACT, *below, Mode.FREE]
             for t, before, after in zip((touch, settled, release, left), modes[:-1], modes[1:], strict=False):
                 found.append(Event(t=t, contact=row, before=before, after=after))
             if k % 2:

@@ -41,9 +41,9 @@ def wrong() -> tuple[Found, ...]:
 
 def _least_squares(J: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return unknowns (p,), their deviations and halves of intervals (p,), and the residual (n,)."""
-    x: Floats = np.linalg.lstsq(J, y, rcond=None)[0]
+    x = np.asarray(np.linalg.lstsq(J, y, rcond=None)[0], dtype=np.float64)
     left, free = y - J @ x, len(y) - J.shape[1]
-    std: Floats = np.sqrt(left @ left / free * np.diag(np.linalg.inv(J.T @ J)))
+    std = np.asarray(np.sqrt(float(left @ left) / free * np.diag(np.linalg.inv(J.T @ J))), dtype=np.float64)
     return x, std, stats.t.ppf(0.5 + 0.5 * ASKED, free) * std, left
 
 
@@ -64,7 +64,8 @@ def _ball() -> Iterator[Within]:
     log, model = known.read(text, known.BALL.replace(f"delay = {known.DELAY}", "")), hw.models.load("ball")
     (cut,) = windows(log, model, 0.0)
     (height,), (speed,) = cut.segment.y, cut.segment.yd
-    J, told = -0.5 * t[:, None] ** 2, "a flight of a ball"
+    told = "a flight of a ball"
+    J = (-0.5 * t[:, None] ** 2).astype(np.float64)
     (g,), (std,), (half,), left = _least_squares(J, heights - height - speed * t)
     fit = hw.identify(log, "ball", ["gravity"], parameters={"gravity": GUESS}, restart=0.0, hold=0)
     yield from _told("gravity", told, fit["gravity"], (float(g), float(std), float(half)), PART)

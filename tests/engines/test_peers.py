@@ -272,3 +272,12 @@ def test_obvious_springs_of_exudyn_are_the_law_s_by_the_mass_that_they_move(mass
     found = peer("exudyn").prepare(case, "default").audit()["constants"]
     assert found["a0"] == pytest.approx(case.law.a0, rel=1e-12)
     assert found["a1"] == pytest.approx(case.law.a1, rel=1e-12)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("zeta", [0.135, 0.3, 0.9975])
+def test_exudyn_ends_at_its_tightest_tolerance(zeta: float) -> None:
+    """At the release of a damped contact its force has a kink, where a step must be allowed to be as short as it is."""
+    for rtol in (1e-12, 2.7e-12):
+        run = peer("exudyn").prepare(cases.load("newtons_cradle", "unequal", zeta=zeta), rtol=rtol).run()
+        assert run.outcome is Outcome.FINISHED

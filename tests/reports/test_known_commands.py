@@ -37,8 +37,8 @@ COMMANDS = {
     "gapmap": ("gapmap", "--n", "2", "--points", "2", "-q", "--out", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
 }  # fmt: skip
-MODULES = {"replay": known_replay, "identify": known_fits, "bench": known_bench, "analyse": known_analysis, "picture": known_pictures,
-           "stress": known_sweep, "gapmap": known_maps}  # fmt: skip
+MODULES = {"replay": known_replay, "identify": known_fits, "bench": known_bench, "analyse": known_analysis,
+           "picture": known_pictures, "stress": known_sweep, "gapmap": known_maps}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -50,7 +50,8 @@ def test_what_is_right_is_not_told(name: str) -> None:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_ends_where_an_answer_is_wrong(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(MODULES[{"bode": "analyse"}.get(name, name)], "wrong", lambda: (("rmse", 1.0, (2.0, 2.0), "a log"),) * 2)
+    module = MODULES[{"bode": "analyse"}.get(name, name)]
+    monkeypatch.setattr(module, "wrong", lambda: (("rmse", 1.0, (2.0, 2.0), "a log"),) * 2)
     ended = CliRunner().invoke(cli, COMMANDS[name])
     assert isinstance(ended.exception, OwnFault)
     assert str(ended.exception) == (
