@@ -37,7 +37,7 @@ OF_ENGINES = "judging.known_engines"
 OF_COMMANDS = {
     "replay": ("replay.known_replay", "replay.known_fits", "replay.known_formats"), "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
-    "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps",),
+    "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),
 }  # fmt: skip
 """Of commands that judge no run: they ask before they say a number."""
 RUNS = "known_answers"

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from crossbody.cases.errors import OwnFault
+from crossbody.cases.mechanisms.cradle import rules
 from crossbody.hw.fitting import covariance, difference
 from crossbody.hw.reading import repair
 from crossbody.hw.reading.plan import Source
@@ -19,7 +20,7 @@ from crossbody.reports.analysis import known_analysis, numbers
 from crossbody.reports.bench import known_bench, measure
 from crossbody.reports.cli import cli
 from crossbody.reports.judging import known
-from crossbody.reports.maps import gapmap, known_maps
+from crossbody.reports.maps import gapmap, known_maps, known_rules
 from crossbody.reports.pages import known_pictures
 from crossbody.reports.replay import known_fits, known_formats, known_replay
 from crossbody.reports.suites.axis import Log
@@ -38,13 +39,13 @@ COMMANDS = {
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
 }  # fmt: skip
 MODULES = {"replay": known_replay, "identify": known_fits, "bench": known_bench, "analyse": known_analysis,
-           "picture": known_pictures, "stress": known_sweep, "gapmap": known_maps}  # fmt: skip
+           "picture": known_pictures, "stress": known_sweep, "gapmap": known_maps, "rules": known_rules}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MODULES)
 def test_what_is_right_is_not_told(name: str) -> None:
     assert MODULES[name].wrong() == ()
-    known.check({"identify": "replay"}.get(name, name))
+    known.check({"identify": "replay", "rules": "gapmap"}.get(name, name))
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -71,6 +72,7 @@ OFF: dict[str, tuple[Any, str, Any]] = {
     "stress by its limit": (execute, "ACCOUNT", 1e6),
     "stress along an axis": (Log, "at", lambda axis, u: axis.low + (axis.high - axis.low) * u),
     "gapmap": (gapmap, "LARGEST_S", 1.5),
+    "rules of springs": (rules, "_reduced", lambda masses: masses[1:]),
     "analyse": (numbers, "controllable", lambda model: len(model.states)),
     "analyse without damping": (LinearModel, "poles", lambda model: 1j * np.linalg.eigvals(model.A)),
 }
