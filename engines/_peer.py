@@ -14,7 +14,7 @@ from crossbody.cases import Case, Event, Mode, Outcome, Parameter, Trajectory
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Bytes, Floats
 from crossbody.cases.brent import brent
-from crossbody.cases.scene_contacts import frictional
+from crossbody.cases.scene_contacts import by_shapes, frictional
 from crossbody.engines._line import CONTACT, FREE, Line, why_no_line
 from crossbody.engines.contract import Run
 
@@ -229,10 +229,17 @@ class Steps:
 
 
 def no_rigid_contact(case: Case) -> str | None:
-    """The sentence for rows that cannot open, where contacts are rigid."""
-    if case.law.unilateral.all():
-        return None
-    return "A rigid contact only pushes, so a row that is always active cannot be one."
+    """The sentence for rows that cannot open, and bounds of no shapes, where contacts are rigid and between shapes."""
+    if not case.law.unilateral.all():
+        return "A rigid contact only pushes, so a row that is always active cannot be one."
+    return no_shapes(case)
+
+
+def no_shapes(case: Case) -> str | None:
+    """Return the sentence for bounds at which no two shapes touch, where what touches are shapes."""
+    bounded = () if case.scene is None else by_shapes(case.scene).bounded
+    name = next((part.name for part in bounded if np.isfinite(part.range).any()), None)
+    return None if name is None else f"A contact is between two shapes, but none touch at the bound of {name!r}."
 
 
 def restitution(scene: Line) -> float:

@@ -25,7 +25,7 @@ from crossbody.engines.contract import Engine
 METHODS = ("DOPRI5", "ODE23")  # the others Exudyn names, but has not
 ATOL_PART = 1e-3  # absolute tolerance in units of the relative one
 LONGEST = 0.1  # s: as no step is rejected that jumps over a contact
-SHORTEST = 1e-14  # s
+SHORTEST = 1e-300  # s: none, since a step that is rejected there is tried again for ever, and nobody called
 FAR = 1e9  # m, where the other stop of a connector is
 TIGHTEST = 1e-12  # below it DOPRI5 may reject a step at a contact for ever, and calls nobody who could end it
 EVERY = 1e-300  # s: sensors keep every step
@@ -141,7 +141,7 @@ def _simulation(case: Case, used: Mapping[str, Any]) -> tuple[Any, Any]:
     settings.solution.sensors.writePeriod = EVERY
     time = settings.timeIntegration
     time.endTime = case.t_end
-    time.minimumStepSize = min(SHORTEST, 1e-9 * case.t_end)
+    time.minimumStepSize = SHORTEST
     if "rtol" not in used:
         time.numberOfSteps = max(1, math.ceil(case.t_end / float(used["dt"]) - 1e-9))
         return settings, exu.DynamicSolverType.GeneralizedAlpha

@@ -23,7 +23,7 @@ from crossbody.cases.rotations import matrices
 from crossbody.cases.scene_contacts import frictional
 from crossbody.engines import settings as _settings
 from crossbody.engines._line import Line, followed, law_name, line
-from crossbody.engines._peer import HIDDEN, PeerRun, ended, sampled, why_beside, why_not
+from crossbody.engines._peer import HIDDEN, PeerRun, ended, no_shapes, sampled, why_beside, why_not
 from crossbody.engines._rubbing import RIGID, RubbingRun
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.drake import _scene
@@ -167,7 +167,7 @@ class Drake(Engine):
             return "A contact of a MultibodyPlant only pushes, so a row that is always active cannot be one."
         if reason is None and profile != "matched" and not float(line(case).a0[0]) > 0.0:
             return "A contact of a MultibodyPlant needs a stiffness above 0."
-        return reason
+        return no_shapes(case) if reason is None and profile != "matched" else reason
 
     def prepare(self, case: Case, profile: str = _settings.MATCHED, **settings: Any) -> Run:
         """Build the system and its simulator; see `Engine.prepare`.

@@ -30,7 +30,7 @@ class Differences:
     """
 
     most = 30
-    tolerance = 0.5
+    tolerance = 0.2  # an interval is as wide as its derivative is wrong
     ftol = 1e-4
     deadline = Deadline()
 

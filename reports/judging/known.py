@@ -32,12 +32,12 @@ KINDS = (
 )  # fmt: skip
 OF_FILES = ("judging.known_files",)
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
-OF_ENGINES = "judging.known_engines"
+OF_ENGINES = ("judging.known_engines", "judging.known_contacts")
 """Of an engine that runs, beside: others are not imported for it."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay", "replay.known_formats"), "bench": ("bench.known_bench",),
+    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_formats"), "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
-    "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps",),
+    "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),
 }  # fmt: skip
 """Of commands that judge no run: they ask before they say a number."""
 RUNS = "known_answers"
@@ -59,7 +59,7 @@ def wrong(*, file: bool = False, ran: Iterable[str] = ()) -> Iterator[Found]:
     if file:
         yield from _once(f"{RUNS}_files", OF_FILES)
     for name in sorted(set(ran) & set(engines.REGISTRY.own())):
-        yield from _once(f"{RUNS}_{name}", (OF_ENGINES,), name)
+        yield from _once(f"{RUNS}_{name}", OF_ENGINES, name)
 
 
 def check(command: str) -> None:

@@ -262,7 +262,8 @@ def _surfaces(made: MadeUp) -> Answers:
     found = [0.0]
     for e in (e for e in run.events if touches[e.contact]):
         gap, push = ways(run.gap[:, e.contact], e.t, near), ways(run.lam[:, e.contact], e.t, light)
-        found += [gap] if _begins(e) else [min(gap, push)] if _ends(e) else []
+        surfaces = e.before == Mode.BALLISTIC
+        found += [gap] if _begins(e) or surfaces else [min(gap, push)] if _ends(e) else []
     return {"event_gap": max(found)}
 
 

@@ -170,3 +170,17 @@ def _bounce() -> Iterator[Found]:
         for found, wanted in ((run.q[i, 0], q[0]), (run.v[i, 0], v[0])):
             off = abs(found - wanted) / (fast / math.sqrt(a0) if wanted is q[0] else fast)
             yield from _told(f"{name} (events)", "a state at the end of a touch", float(off), FEW * rtol)
+        most = MASS * pressed(a0, a1, fast, release - touch)
+        off = abs(float(run.lam[:, 0].max()) / most - 1.0)
+        yield from _told(f"{name} (peaks)", "what presses most in a touch", off, FEW * rtol)
+
+
+def pressed(a0: float, a1: float, fast: float, lasts: float) -> float:
+    """Return the largest acceleration a touch gives a mass that comes with a speed, m/s^2: where the jerk is none."""
+    poles = np.roots([1.0, a1, a0]).astype(complex)
+    parts = np.linalg.solve(np.stack([np.ones(2), poles]), np.array([0.0, -fast], dtype=complex))
+    # The jerk is the real part of one rotating arrow, twice: its phase tells when it is none.
+    jerk, pole = (parts * poles**3)[0], poles[0]
+    turns = (0.5 * math.pi - np.angle(jerk) + math.pi * np.arange(-2, 3)) / pole.imag
+    inside = turns[(turns > 0.0) & (turns < lasts)]
+    return float(np.max(exponentials(a0, a1, (0.0, -fast), inside)[2])) + GRAVITY

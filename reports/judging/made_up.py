@@ -126,14 +126,15 @@ class MadeUp:
         return Trajectory(t=t, mode=mode, events=tuple(events), steps=len(t), ledger=ledger, **made)  # type: ignore[arg-type]
 
     def _contacts(self) -> list[Event]:
-        """Return contacts that end, one row after the other; behind every other one a blow in no time."""
+        """Return contacts that end, one row after the other; behind each a blow, or a way below the surface."""
         random, rows, t_end = self.random, np.flatnonzero(self.case.law.touches).tolist(), self.case.t_end
         found: list[Event] = []
         ends = np.sort(random.uniform(0.05, 0.95, 2 * CONTACTS)) * t_end
         for k, (touch, release) in enumerate(ends.reshape(-1, 2).tolist() if rows else ()):
             row, settled = rows[k % len(rows)], touch + random.uniform(0.2, 0.8) * (release - touch)
-            modes = (Mode.FREE, Mode.COLLISION, Mode.CONTACT, Mode.FREE)
-            for t, before, after in zip((touch, settled, release), modes[:-1], modes[1:], strict=True):
+            below, left = [Mode.BALLISTIC] * (k % 2 == 0), 0.5 * (release + [*ends, t_end][2 * k + 2])
+            modes = [Mode.FREE, Mode.COLLISION, Mode.CONTACT, *below, Mode.FREE]
+            for t, before, after in zip((touch, settled, release, left), modes[:-1], modes[1:], strict=False):
                 found.append(Event(t=t, contact=row, before=before, after=after))
             if k % 2:
                 at, impulse = release + 1e-3 * t_end, float(random.uniform(1.0, 50.0))

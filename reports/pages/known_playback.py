@@ -84,6 +84,24 @@ def _track(i: int, track: Any) -> Iterator[Said]:
         yield f"colour of {who}", track["color"], look(who)["color"]
 
 
+WORDS = {
+    "FREE": "opens", "CONTACT": "presses", "BALLISTIC": "lets go below the surface", "COLLISION": "collides",
+    "COLLISION_SEPARATION": "separates", "BILATERAL": "holds", "STICK": "sticks", "SLIP": "slips",
+}  # fmt: skip
+"""What a contact does by the mode that it comes into; from FREE into either of those that press it touches."""
+
+
+def _words() -> Iterator[Said]:
+    """Yield what is said of every change of mode, one a second."""
+    made, pairs = drawn().traces[0], [(one, two) for one in Mode for two in Mode if one != two]
+    events = tuple(Event(t=float(k), contact=0, before=one, after=two) for k, (one, two) in enumerate(pairs))
+    instants, told = playback.happens(replace(made, run=replace(made.run, events=events)), 0.0)
+    yield "instants of all changes", instants, [e.t for e in events]
+    touches = {("FREE", "CONTACT"), ("FREE", "COLLISION")}
+    words = ["touches" if (a.name, b.name) in touches else WORDS[b.name] for a, b in pairs]
+    yield "words of all changes", tuple(told), tuple(f"{CONTACTS[0]} {word}" for word in words)
+
+
 def _latest(instants: list[float], events: list[Event]) -> float:
     """Return how long after the last instant that is told before it an event comes at most, s."""
     return max(e.t - max((t for t in instants if t <= e.t), default=-np.inf) for e in events)
@@ -233,6 +251,7 @@ def _pairs_of_balls() -> Iterator[Said]:
 
 
 KINDS = {
-    "arrows of rows": _rows, "arrows of balls": _pairs_of_balls, "playback": _playback, "loops of force": _loops,
+    "arrows of rows": _rows, "arrows of balls": _pairs_of_balls, "playback": _playback, "words of playback": _words,
+    "loops of force": _loops,
     "friction figures": _friction, "loops": _sides, "loops off scale": _far,
 }  # fmt: skip

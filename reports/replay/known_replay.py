@@ -38,6 +38,7 @@ BEGINS, COUNTS, ZERO, LATE = 12.5, 4000.0, 30.0, 0.023
 """Its first time, s; counts of an encoder a turn; its angle at zero counts, degrees; and by how much it is late, s."""
 NOISE, ALIKE = 2e-4, 0.15
 """Of angles, rad; and to which part a deviation is known by so many samples."""
+GIVEN = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
 TORQUES, HELD, ANGLE, RATE = (0.02, -0.03, 0.01), 0.8, 0.4, -1.5
 """Torques, N m, each for so long, s; and angle and rate at first, rad and rad/s."""
 LINK = """
@@ -67,6 +68,20 @@ column = "h"
 unit = "mm"
 delay = 0.004
 """
+TURN = 0.3
+"""By how much an angle grows in a sample, rad."""
+TURNS = """
+[time]
+column = "t"
+unit = "s"
+sample_time = 0.01
+[coordinates.a]
+column = "a"
+unit = "deg"
+[inputs.u]
+column = "u"
+unit = "N"
+"""
 TICK, STEP_TICKS = 2.5e-5, 400
 """Length of a tick of a clock, s, and how many of them are between samples."""
 TICKS = "clock,h,temperature,speed\n1000,1,20,0\n1400,2,20.5,60\n1800,3,21,120\n"
@@ -85,6 +100,8 @@ unit = "degC"
 column = "speed"
 unit = "rpm"
 """
+UNLIKE = 2e-3
+"""Noise of a ball's height, m."""
 WALL = 0.5
 """Time that a prediction is told to have taken, s."""
 
@@ -92,11 +109,11 @@ WALL = 0.5
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    kinds = (_reading, _joined, _measured, _link, _noisy, _ball, _bounces, _impacts, _needed, _looked)
+    kinds = (_reading, _repaired, _joined, _measured, _link, _ball, _bounces, _impacts, _needed, _looked)
     return unlike(kinds, "log", "a log that ends in")
 
 
-def _turned(t: Floats, inertia: float = INERTIA) -> Floats:
+def turned(t: Floats, inertia: float = INERTIA) -> Floats:
     """Return the angles of a link (n,), rad, at instants t of its log, s: the sum of its answers to each change."""
     J, before = inertia + MASS * REACH**2, 0.0
     found: Floats = ANGLE + RATE * (J / DRAG) * (1.0 - np.exp(-DRAG / J * t))
@@ -112,41 +129,59 @@ def _torque(t: Floats) -> Floats:
     return found
 
 
-def _read(text: str, columns: str) -> Log:
+def read(text: str, columns: str, repair: tuple[str, ...] = ()) -> Log:
     """Return a log that was written as text."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
         path.write_text(text, encoding="utf-8")
-        return hw.read(path, parse_columns(columns))
+        return hw.read(path, parse_columns(columns), repair=repair)
 
 
 @cache
-def _link_log(late: float = 0.0, noise: float = 0.0) -> Log:
+def link_log(late: float = 0.0, noise: float = 0.0) -> Log:
+    """Return the log of the link whose angles are late, s, and noisy, rad."""
     t = STEP * np.arange(SAMPLES, dtype=np.float64)
-    angles = _turned(t - late) + noise * np.random.default_rng(5).normal(size=SAMPLES)
+    angles = turned(t - late) + noise * np.random.default_rng(5).normal(size=SAMPLES)
     counts = (-np.degrees(angles) + ZERO) * COUNTS / 360.0
     rows = zip((1e3 * (BEGINS + t)).tolist(), counts.tolist(), (1e3 * _torque(t)).tolist(), strict=True)
-    return _read("\n".join(["clock,encoder,drive", *(",".join(map(repr, row)) for row in rows)]), LINK)
+    return read("\n".join(["clock,encoder,drive", *(",".join(map(repr, row)) for row in rows)]), LINK)
 
 
 def _reading() -> Iterator[Within]:
-    log, t = _link_log(), STEP * np.arange(SAMPLES, dtype=np.float64)
+    log, t = link_log(), STEP * np.arange(SAMPLES, dtype=np.float64)
     pairs: tuple[tuple[str, Floats, Floats], ...] = (
-        ("times", log.time, BEGINS + t), ("angles", log.channel("coordinates", "th1").values, _turned(t)),
+        ("times", log.time, BEGINS + t), ("angles", log.channel("coordinates", "th1").values, turned(t)),
         ("torques", log.channel("inputs", "torque 1").values, _torque(t)),
     )  # fmt: skip
     for what, found, wanted in pairs:
         worst = int(np.argmax(np.abs(found - wanted)))
         yield "log", f"{what} of a made-up log", float(found[worst]), float(wanted[worst]), EXACT * (BEGINS + 10.0)
-    ticks = _read(TICKS, COUNTED)
+    ticks = read(TICKS, COUNTED)
     yield "log", "times of whole ticks", float(ticks.time[-1] - ticks.time[0]), 2.0 * TICK * STEP_TICKS, EXACT
     warm, rate = (ticks.channel("sensors", name).values[1] for name in ("warmth", "turns"))
     yield "log", "a temperature in degrees", float(warm), 273.15 + 20.5, 1e-9
     yield "log", "a rate in turns a minute", float(rate), 60.0 * 2.0 * math.pi / 60.0, 1e-9
-    late = _read("t,h\n0,1\n0.01,2\n0.02,3\n", BALL)
+    late = read("t,h\n0,1\n0.01,2\n0.02,3\n", BALL)
     true = late.times("coordinates", "height")
     yield "log", "when a late height was true", float(true[1]), STEP - DELAY, EXACT
     yield "log", "a height in mm", float(late.channel("coordinates", "height").values[1]), 2e-3, EXACT
+
+
+def _repaired() -> Iterator[Within]:
+    """Yield rows that are put where samples are missing, or taken where they stand twice, and angles without turns."""
+    n, missing, twice = 40, (13, 14), 22
+    count = np.arange(n, dtype=np.float64)
+    wraps = np.degrees(np.arctan2(np.sin(TURN * count), np.cos(TURN * count)))
+    stands = [k for k in range(n) if k not in missing for _ in range(1 + (k == twice))]
+    text = "\n".join(["t,a,u", *(f"{STEP * k!r},{float(wraps[k])!r},{float(k)!r}" for k in stands)])
+    log = read(text, TURNS, ("drop_duplicates", "fill_dropped", "unwrap"))
+    holds = np.where(np.isin(count, missing), missing[0] - 1.0, count)
+    pairs = (("times", log.time, STEP * count), ("angles", log.channel("coordinates", "a").values, TURN * count),
+             ("commands", log.channel("inputs", "u").values, holds))  # fmt: skip
+    yield "log", "rows of a repaired log", float(len(log.time)), float(n), 0.0
+    for what, found, wanted in pairs:
+        worst = int(np.argmax(np.abs(found - wanted)))
+        yield "log", f"{what} of a repaired log", float(found[worst]), float(wanted[worst]), EXACT
 
 
 def _joined() -> Iterator[Within]:
@@ -191,35 +226,14 @@ def _rows(found: Comparison) -> dict[str, float]:
 
 def _link() -> Iterator[Within]:
     """Yield how far a replay of the link is from its log, and what is identified from it."""
-    given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
-    log = _link_log()
-    replayed = hw.replay(log, "single_pendulum", parameters=given, restart=0.6)
+    log = link_log()
+    replayed = hw.replay(log, "single_pendulum", parameters=GIVEN, restart=0.6)
     yield "largest", "a replay of its own motion", _rows(replayed)["largest"], 0.0, 1e3 * CLOSE
-    more = given | {"I1": 1.4 * INERTIA, "k1": 0.7 * DRAG}
-    fit = hw.identify(_link_log(LATE), "single_pendulum", ["I1", "k1", "delay"], parameters=more, restart=1.2, hold=0)
+    more = GIVEN | {"I1": 1.4 * INERTIA, "k1": 0.7 * DRAG}
+    fit = hw.identify(link_log(LATE), "single_pendulum", ["I1", "k1", "delay"], parameters=more, restart=1.2, hold=0)
     for name, wanted in (("I1", INERTIA), ("k1", DRAG), ("delay", LATE)):
         yield f"estimate of {name}", "a link of known motion", fit[name].value, wanted, 1e3 * CLOSE * wanted
         yield f"interval of {name}", "a link without noise", fit[name].high - fit[name].low, 0.0, 1e4 * CLOSE * wanted
-
-
-def _noisy() -> Iterator[Within]:
-    """Yield deviations of what is identified of a link whose angles are noisy, beside those of linear least squares."""
-    given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": 1.2 * INERTIA, "k1": DRAG}
-    fit = hw.identify(_link_log(0.0, NOISE), "single_pendulum", ["I1"], parameters=given, restart=0.0, hold=0)
-    spread = _spread()
-    estimate = fit["I1"]
-    yield "std of I1", "a link with noise", estimate.std, spread, 2.0 * ALIKE * spread
-    yield "estimate of I1", "a link with noise", estimate.value, INERTIA, 5.0 * spread
-    wide = (estimate.high - estimate.low) / (2.0 * estimate.std)
-    yield "interval", "in deviations", wide, 1.96, 0.1
-
-
-def _spread() -> float:
-    """Return the deviation of the link's inertia by least squares in it and its start, by differences."""
-    t, step, settles = STEP * np.arange(SAMPLES, dtype=np.float64), 1e-4 * INERTIA, (INERTIA + MASS * REACH**2) / DRAG
-    slope = (_turned(t, INERTIA + step) - _turned(t, INERTIA - step)) / (2.0 * step)
-    slopes = np.column_stack([slope, np.ones(SAMPLES), settles * (1.0 - np.exp(-t / settles))])
-    return NOISE * math.sqrt(float(np.linalg.inv(slopes.T @ slopes)[0, 0]))
 
 
 def _ball() -> Iterator[Within]:
@@ -228,7 +242,7 @@ def _ball() -> Iterator[Within]:
     true = t - DELAY
     heights = HEIGHT + SPEED * true - 0.5 * G * true**2
     text = "\n".join(["t,h", *(f"{a!r},{1e3 * b!r}" for a, b in zip(t.tolist(), heights.tolist(), strict=True))])
-    found = hw.replay(_read(text, BALL), "ball", parameters={"gravity": G}, restart=WINDOW)
+    found = hw.replay(read(text, BALL), "ball", parameters={"gravity": G}, restart=WINDOW)
     found = replace(found, predictions=tuple(replace(one, wall_s=WALL) for one in found.predictions))
     rows, count = _rows(found), round(WINDOW / STEP)
     ages = np.concatenate([STEP * np.arange(count + 1) - DELAY] * 2)
@@ -247,6 +261,13 @@ def _ball() -> Iterator[Within]:
             yield f"error_{age:g}s_{name}", told, rows[f"error_{age:g}s_{name}"], wanted, CLOSE
     yield "speed", told, rows["speed"], 2.0 * WINDOW / WALL, EXACT
     yield "windows_failed", told, rows["windows_failed"], 0.0, 0.0
+    draw = np.random.default_rng(6)
+    left = [w.y + UNLIKE * draw.normal(size=w.y.shape) for w in found.windows]
+    noisy = _rows(replace(found, windows=tuple(replace(w, y=y) for w, y in zip(found.windows, left, strict=True))))
+    rest = [(y - yhat) ** 2 for y, yhat in zip(left, found.predictions[0].y, strict=True)]
+    wanted = math.sqrt(float(np.mean(np.concatenate(rest))) - noisy["noise"] ** 2)
+    yield "noise", "a ball whose record is noisy", noisy["noise"], UNLIKE, 2.0 * ALIKE * UNLIKE
+    yield "unexplained", "a ball whose record is noisy", noisy["unexplained"], wanted, CLOSE
     failed = replace(found.predictions[0], outcomes=(Outcome.NOT_FINITE, Outcome.FINISHED))
     one = _rows(replace(found, predictions=(failed,)))
     yield "windows_failed", "a prediction that failed once", one["windows_failed"], 1.0, 0.0
@@ -256,7 +277,7 @@ def _bounces() -> Iterator[Within]:
     """Yield how late, and by how much weaker, the impacts of a prediction are than those that are measured."""
     t = STEP * np.arange(round(FLIES / STEP) + 2)
     text = "\n".join(["t,h", *(f"{a!r},1000.0" for a in t.tolist())])
-    found = hw.replay(_read(text, BALL), "ball", parameters={"gravity": G}, restart=0.0)
+    found = hw.replay(read(text, BALL), "ball", parameters={"gravity": G}, restart=0.0)
     (window,), (one,) = found.windows, found.predictions
     at, late, up, less = 0.3, 0.03, 2.5, 0.8
     falls, shifted = (np.where(window.t < hit, hit - window.t, keeps * up * (window.t - hit))[:, None]
@@ -306,8 +327,7 @@ def _impacts() -> Iterator[Within]:
 
 def _needed() -> Iterator[Within]:
     """Yield the torques that the motion of the link needs, away from their changes, and how well these are known."""
-    given = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
-    found = hw.inverse(_link_log(), "single_pendulum", parameters=given, half=6, degree=4)
+    found = hw.inverse(link_log(), "single_pendulum", parameters=GIVEN, half=6, degree=4)
     t = found.t - BEGINS
     quiet = np.min(np.abs(t[:, None] - HELD * np.arange(len(TORQUES) + 1)), axis=1) > 8.0 * STEP
     off = np.abs(found.value[:, 0] - _torque(t))[quiet]

@@ -10,6 +10,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import CaseUnsupported, EngineUnavailable, Mode, Outcome
+from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Loop, Scene, Tendon
 from crossbody.engines._line import line
 from crossbody.engines._peer import ended, sampled
@@ -272,3 +273,24 @@ def test_obvious_springs_of_exudyn_are_the_law_s_by_the_mass_that_they_move(mass
     found = peer("exudyn").prepare(case, "default").audit()["constants"]
     assert found["a0"] == pytest.approx(case.law.a0, rel=1e-12)
     assert found["a1"] == pytest.approx(case.law.a1, rel=1e-12)
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("zeta", [0.135, 0.3, 0.9975])
+def test_exudyn_ends_at_its_tightest_tolerance(zeta: float) -> None:
+    """At the release of a damped contact its force has a kink, where a step must be allowed to be as short as it is."""
+    for rtol in (1e-12, 2.7e-12):
+        run = peer("exudyn").prepare(cases.load("newtons_cradle", "unequal", zeta=zeta), rtol=rtol).run()
+        assert run.outcome is Outcome.FINISHED
+
+
+@pytest.mark.parametrize("name", STEPPED)
+def test_a_bound_at_which_no_shapes_touch_is_refused(name: str) -> None:
+    """Where what touches are shapes a body would go through it."""
+    body = Body(name="cart", mass=1.3, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    rail = Joint(name="rail", body="cart", type="slide", axis=(1.0, 0.0, 0.0), range=(0.35, np.inf))
+    case = case_of(Scene(bodies=(body,), joints=(rail,)), q0=[0.6], v0=[-1.3], t_end=0.5)
+    assert (
+        peer(name).why_not(case, "matched") == "A contact is between two shapes, but none touch at the bound of 'rail'."
+    )
+    assert peer(name).why_not(cases.load("newtons_cradle", "sliders"), "matched") is None

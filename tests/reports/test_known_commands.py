@@ -10,7 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from crossbody.cases.errors import OwnFault
-from crossbody.hw.fitting import covariance
+from crossbody.cases.mechanisms.cradle import rules
+from crossbody.hw.fitting import covariance, difference
+from crossbody.hw.reading import repair
 from crossbody.hw.reading.plan import Source
 from crossbody.hw.replaying import measures
 from crossbody.reference.linear import LinearModel
@@ -18,9 +20,9 @@ from crossbody.reports.analysis import known_analysis, numbers
 from crossbody.reports.bench import known_bench, measure
 from crossbody.reports.cli import cli
 from crossbody.reports.judging import known
-from crossbody.reports.maps import gapmap, known_maps
+from crossbody.reports.maps import gapmap, known_maps, known_rules
 from crossbody.reports.pages import known_pictures
-from crossbody.reports.replay import known_formats, known_replay
+from crossbody.reports.replay import known_fits, known_formats, known_replay
 from crossbody.reports.suites.axis import Log
 from crossbody.reports.sweep import execute, known_sweep
 
@@ -36,21 +38,21 @@ COMMANDS = {
     "gapmap": ("gapmap", "--n", "2", "--points", "2", "-q", "--out", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
 }  # fmt: skip
-MODULES = {"replay": known_replay, "bench": known_bench, "analyse": known_analysis, "picture": known_pictures,
-           "stress": known_sweep, "gapmap": known_maps}  # fmt: skip
+MODULES = {"replay": known_replay, "identify": known_fits, "bench": known_bench, "analyse": known_analysis,
+           "picture": known_pictures, "stress": known_sweep, "gapmap": known_maps, "rules": known_rules}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MODULES)
 def test_what_is_right_is_not_told(name: str) -> None:
     assert MODULES[name].wrong() == ()
-    known.check(name)
+    known.check({"identify": "replay", "rules": "gapmap"}.get(name, name))
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_ends_where_an_answer_is_wrong(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
-    kind = {"identify": "replay", "bode": "analyse"}.get(name, name)
-    monkeypatch.setattr(MODULES[kind], "wrong", lambda: (("rmse", 1.0, (2.0, 2.0), "a log"),) * 2)
+    module = MODULES[{"bode": "analyse"}.get(name, name)]
+    monkeypatch.setattr(module, "wrong", lambda: (("rmse", 1.0, (2.0, 2.0), "a log"),) * 2)
     ended = CliRunner().invoke(cli, COMMANDS[name])
     assert isinstance(ended.exception, OwnFault)
     assert str(ended.exception) == (
@@ -62,12 +64,15 @@ def test_a_command_ends_where_an_answer_is_wrong(name: str, monkeypatch: pytest.
 OFF: dict[str, tuple[Any, str, Any]] = {
     "replay": (measures, "bias", lambda y, yhat: float(np.mean(y - yhat))),
     "replay in a unit": (Source, "to_si", lambda source, raw: source.conversion.apply(raw)),
-    "replay with deviations": (covariance, "LEVEL", 0.8),
+    "replay without repairs": (repair, "GAP", 9.0),
+    "identify with intervals": (covariance, "LEVEL", 0.8),
+    "identify with steps": (difference, "STEP", 1e-13),
     "bench": (measure, "NATIVE", 1),
     "stress": (known_sweep, "residual", lambda run: 0.0),
     "stress by its limit": (execute, "ACCOUNT", 1e6),
     "stress along an axis": (Log, "at", lambda axis, u: axis.low + (axis.high - axis.low) * u),
     "gapmap": (gapmap, "LARGEST_S", 1.5),
+    "rules of springs": (rules, "_reduced", lambda masses: masses[1:]),
     "analyse": (numbers, "controllable", lambda model: len(model.states)),
     "analyse without damping": (LinearModel, "poles", lambda model: 1j * np.linalg.eigvals(model.A)),
 }
@@ -77,14 +82,14 @@ OFF: dict[str, tuple[Any, str, Any]] = {
 def test_a_number_that_is_off_is_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     module = MODULES[what.split()[0]]
     own, name, other = OFF[what]
-    for cached in ("wrong", "_link_log", "_hanging"):
+    for cached in ("wrong", "link_log", "_hanging"):
         if hasattr(module, cached):
             getattr(module, cached).cache_clear()
     monkeypatch.setattr(own, name, other)
     try:
         assert module.wrong()
     finally:
-        for cached in ("wrong", "_link_log", "_hanging"):
+        for cached in ("wrong", "link_log", "_hanging"):
             if hasattr(module, cached):
                 getattr(module, cached).cache_clear()
 

@@ -155,8 +155,8 @@ def test_multipliers_pull_or_act_on_open_rows_by_a_part_of_the_largest(one: Draw
 
 def test_instants_and_numbers_of_contacts_are_matched_in_order(one: Drawn) -> None:
     """Each of its own, up to the time for which the truth is trusted; one that the run lacks is counted."""
-    touches, releases = ([e for e in one.exact.events if (e.before, e.after) == kind]
-                         for kind in ((Mode.FREE, Mode.COLLISION), (Mode.CONTACT, Mode.FREE)))  # fmt: skip
+    touches = [e for e in one.exact.events if (e.before, e.after) == (Mode.FREE, Mode.COLLISION)]
+    releases = [e for e in one.exact.events if e.before == Mode.CONTACT]
     pairs = list(zip(touches, releases, strict=True))
     for until in (one.truth.trusted, 0.5 * one.case.t_end):
         known = [t for a, b in pairs if a.t <= until for t in (a.t, b.t)]

@@ -260,6 +260,28 @@ def test_a_plane_that_a_body_carries_is_where_the_body_is(solids: Path, browser:
     assert moved == pytest.approx(wanted, abs=1e-12)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_axes_of_a_body_are_those_of_its_pose_and_right_handed(
+    solids: Path, browser: chromium.Browser, seed: int
+) -> None:
+    """Of a pose between two pictures too, whose axes are shorter and lean; and corners are where these have them."""
+    draw = np.random.default_rng(seed)
+    turn, skew = np.linalg.qr(draw.normal(size=(3, 3)))[0], draw.uniform(0.2, 0.9)
+    turn *= np.linalg.det(turn)
+    at, corner, radius = draw.normal(size=3), draw.normal(size=3), float(draw.uniform(0.1, 0.9))
+    browser.open(solids)
+    for second in (turn[:, 1], 0.7 * turn[:, 1] + skew * turn[:, 0]):
+        numbers = [0.0] * 9 + [*at, *(skew * turn[:, 0]), *second]
+        browser.js(f"window.posed = (i) => {json.dumps(numbers)}[i]")
+        found = browser.js("crossbody.solids.frame(window.posed, 1)")
+        assert found["origin"] == pytest.approx(at.tolist(), abs=1e-12)
+        assert np.array(found["axes"]) == pytest.approx(turn.T, abs=1e-12)
+        solid = json.dumps({"body": 1, "points": [corner.tolist()], "radius": radius})
+        low, high = browser.js(f"crossbody.solids.extent(window.posed, {solid})")
+        assert low == pytest.approx((at + turn @ corner - radius).tolist(), abs=1e-12)
+        assert high == pytest.approx((at + turn @ corner + radius).tolist(), abs=1e-12)
+
+
 EDGE = (
     "(() => { const c = document.querySelector('.player canvas'); const g = c.getContext('2d');"
     " const seen = new Set();"

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from random_scenes import random_scene, random_state
 
-from crossbody.cases import Case, EngineUnavailable, Outcome
+from crossbody.cases import Case, EngineUnavailable, Outcome, Tier, load
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
+from crossbody.reference.sundials.level_machine import LevelMachine
 from crossbody.reference.tree import system as tree
 from crossbody.reports.judging import truth as judging
 from crossbody.reports.judging.truth_row import truth_row
@@ -137,3 +138,14 @@ def test_a_string_that_cannot_get_shorter_ends_a_motion_with_a_sentence(seed: in
     assert run.outcome is Outcome.ILL_POSED
     assert run.t[-1] == pytest.approx({5: 0.02570867479, 7: 0.00196796183}[seed], rel=1e-6)
     assert "lmost nothing can move" in run.message
+
+
+@pytest.mark.timeout(100)
+def test_a_second_machine_that_does_not_end_is_left_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a case with kernels of its own too: one that is wrong may switch for ever, and the truth says so."""
+    case = load("ball_maze", "free")
+    monkeypatch.setattr(LevelMachine, "contradicts", lambda *_: True)  # it switches after every step
+    monkeypatch.setattr(judging, "OF_KERNELS", 0.1)
+    truth = judging.truth_of(case, budget=1.0)
+    assert truth.tier is Tier.D
+    assert "CVODE, which shares only the equations, takes longer than --budget allows: up to t = " in truth.source

@@ -1,0 +1,93 @@
+"""What an identification must say of logs whose least squares are written out here: estimates and their intervals.
+
+A ball in flight from a known start is linear in gravity, y = h + v t - g t^2/2, and its windows start as measured: so
+the derivative is -t^2/2 whatever step it is taken over. A link that turns about its end without weight
+(`known_replay`) is identified with its start. Of white residuals r of n samples, J their derivatives by p unknowns, a
+deviation is the root of r.r/(n - p) (J^T J)^-1, and half an interval so many of it as Student's t with n - p degrees
+of freedom has at 97.5 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+from scipy import stats
+
+from crossbody import hw
+from crossbody.cases.arrays import Floats
+from crossbody.hw import Estimate
+from crossbody.hw.fitting.difference import Differences
+from crossbody.hw.fitting.doubts import SPAN
+from crossbody.hw.windows.window import windows
+from crossbody.reports.judging.asked import Found, Within, unlike
+from crossbody.reports.replay import known_replay as known
+
+FIRST, PART, CURVED = 1e-5, 2e-3, 1e-2
+"""By which part numbers may be off: of what engines leave; of what a linear problem, and one that is nearly so, makes
+of deviations."""
+FLIES, HEIGHT, SPEED, GUESS, STILL = 0.64, 3.0, 4.0, 7.0, 12
+"""Of the ball: s, m, m/s, m/s^2, and samples at its start that have no noise."""
+ASKED = 0.95
+"""Part of all intervals that have the true value in them."""
+
+
+@cache
+def wrong() -> tuple[Found, ...]:
+    """Return what, number, least and most, and of which log, where it is another one."""
+    return unlike((_ball, _link), "identification", "a log that ends in")
+
+
+def _least_squares(J: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return unknowns (p,), their deviations and halves of intervals (p,), and the residual (n,)."""
+    x = np.asarray(np.linalg.lstsq(J, y, rcond=None)[0], dtype=np.float64)
+    left, free = y - J @ x, len(y) - J.shape[1]
+    std = np.asarray(np.sqrt(float(left @ left) / free * np.diag(np.linalg.inv(J.T @ J))), dtype=np.float64)
+    return x, std, stats.t.ppf(0.5 + 0.5 * ASKED, free) * std, left
+
+
+def _told(name: str, what: str, found: Estimate, wanted: tuple[float, float, float], part: float) -> Iterator[Within]:
+    value, std, half = wanted
+    yield f"estimate of {name}", what, found.value, value, part * std
+    yield f"deviation of {name}", what, found.std, std, part * std
+    for end, sign in ((found.low, -1.0), (found.high, 1.0)):
+        yield f"interval of {name}", what, end, value + sign * half, 2.0 * part * half
+
+
+def _ball() -> Iterator[Within]:
+    """Yield gravity from a flight of known start, its derivative, interval and profile: no part of it is curved."""
+    t = known.STEP * np.arange(round(FLIES / known.STEP) + 1)
+    noise = known.NOISE * np.random.default_rng(8).normal(size=len(t)) * (np.arange(len(t)) > STILL)
+    heights = HEIGHT + SPEED * t - 0.5 * known.G * t**2 + noise
+    text = "\n".join(["t,h", *(f"{a!r},{1e3 * b!r}" for a, b in zip(t.tolist(), heights.tolist(), strict=True))])
+    log, model = known.read(text, known.BALL.replace(f"delay = {known.DELAY}", "")), hw.models.load("ball")
+    (cut,) = windows(log, model, 0.0)
+    (height,), (speed,) = cut.segment.y, cut.segment.yd
+    told = "a flight of a ball"
+    J = (-0.5 * t[:, None] ** 2).astype(np.float64)
+    (g,), (std,), (half,), left = _least_squares(J, heights - height - speed * t)
+    fit = hw.identify(log, "ball", ["gravity"], parameters={"gravity": GUESS}, restart=0.0, hold=0)
+    yield from _told("gravity", told, fit["gravity"], (float(g), float(std), float(half)), PART)
+    values, costs = fit.profile["gravity"]
+    yield "profile", told, float(costs[-1]), 1.0 + SPAN**2 / (len(t) - 1), PART
+    yield "values of a profile", told, float(values[-1] - values[0]), 2.0 * SPAN * float(std), PART * float(std)
+    yield "rmse", told, fit.after["rmse"][0], float(np.sqrt(np.mean(left**2))), FIRST * known.NOISE
+    problem = Differences(model, model.numbers(None), ["gravity"], [cut], False, 1, "")
+    slopes = problem.jacobian(np.array([GUESS]))
+    worst = int(np.argmax(np.abs(slopes + J)))
+    yield "derivative", told, float(slopes[worst, 0]), -float(J[worst, 0]), FIRST * float(np.abs(J).max())
+
+
+def _link() -> Iterator[Within]:
+    """Yield the inertia of a link from noisy angles, beside least squares in it and its start, to first order."""
+    t, step = known.STEP * np.arange(known.SAMPLES, dtype=np.float64), 1e-4 * known.INERTIA
+    settles = (known.INERTIA + known.MASS * known.REACH**2) / known.DRAG
+    slope = (known.turned(t, known.INERTIA + step) - known.turned(t, known.INERTIA - step)) / (2.0 * step)
+    J = np.column_stack([slope, np.ones(known.SAMPLES), settles * (1.0 - np.exp(-t / settles))])
+    log = known.link_log(0.0, known.NOISE)
+    x, std, half, _ = _least_squares(J, log.channel("coordinates", "th1").values - known.turned(t))
+    given = known.GIVEN | {"I1": 1.2 * known.INERTIA}
+    fit = hw.identify(log, "single_pendulum", ["I1"], parameters=given, restart=0.0, hold=0)
+    wanted = known.INERTIA + float(x[0]), float(std[0]), float(half[0])
+    yield from _told("I1", "a link with noise", fit["I1"], wanted, CURVED)
