@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
+from crossbody.cases.defaults import shortest
 from crossbody.cases.remembered import remembered
 from crossbody.cases.trajectory import Event, Mode, Trajectory
 
@@ -88,11 +89,13 @@ class _Rests:
         self.gap = np.abs(run.gap)
         self.near = AT_REST * max(1.0, float(np.max(np.abs(run.q), initial=0.0)))
         self.light = LIGHT * max(1.0, float(np.nanmax(self.lam, initial=0.0)))
+        self.short = shortest(float(run.t[-1])) if len(run.t) else 0.0
 
     def joined(self, row: int, own: list[Contact]) -> list[Contact]:
         """Return the contacts of one row less those that bear nothing, and those joined between which no gap opens.
 
-        One that begins where the one before ends is the same: modes were tried at that instant.
+        One that begins where the one before ends is the same, as far as that is known: rows were tried at that instant,
+        or two of them switch there in an order that no run tells.
         """
         if (self.mode[:, row] < 0).any():
             return own
@@ -102,7 +105,8 @@ class _Rests:
         for c in own:
             if self._bears_nothing(c):
                 continue
-            if found and (found[-1].release == c.touch or self._stays(row, found[-1].release, c.touch)):
+            short = bool(found) and c.touch - found[-1].release <= self.short
+            if short or (found and self._stays(row, found[-1].release, c.touch)):
                 found[-1] = replace(c, touch=found[-1].touch, settled=min(found[-1].settled, c.settled))
             else:
                 found.append(c)

@@ -300,11 +300,13 @@ class CompiledRun:
         return watched(self.system, run)
 
     def _event_list(self) -> tuple[Event, ...]:
+        """Return the transitions; what was tried at an instant at which it sticks as before is none."""
         count = int(self.state["events"][0]) if self.options.events else 0
         times, rows, impulses = (self.buffers[name][:count].tolist() for name in _EVENT_BUFFERS[:3])
         return tuple(
             Event(t=t, contact=i, before=Mode(before), after=Mode(after), impulse=impulse)
             for t, (i, before, after), impulse in zip(times, rows, impulses, strict=True)
+            if not before == after == Mode.STICK
         )
 
     def _switch_list(self) -> tuple[Switch, ...]:

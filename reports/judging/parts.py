@@ -375,7 +375,8 @@ class Events:
 
     def __init__(self, case: Case, truth: Truth, run: Trajectory) -> None:
         self.case, self.truth, self.run = case, truth, run
-        self.whole = self._shifts(truth, run)
+        self.shared = self._shared(truth, run)
+        self.whole = _shifts(self.shared)
 
     def __call__(self, run: Trajectory) -> Floats:
         """Return the error of the same instants of another run.
@@ -383,7 +384,7 @@ class Events:
         Raises:
             NotMeasuredError: if it has others.
         """
-        return self._same(self._shifts(self.truth, run))
+        return self._same(self._shared(self.truth, run), _IN_TRUTH)
 
     def against(self, own: Truth) -> Floats:
         """Return the error of the judged run against another truth.
@@ -391,21 +392,27 @@ class Events:
         Raises:
             NotMeasuredError: if that has other events.
         """
-        return self._same(self._shifts(own, self.run))
+        return self._same(self._shared(own, self.run), _IN_RUN)
 
-    def _shifts(self, truth: Truth, run: Trajectory) -> Floats:
-        pairs = matched(truth, run)
-        found = [b.touch - a.touch for a, b in pairs]
-        found += [b.release - a.release for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
-        shifts = np.array(found).reshape(-1, 1)
-        return shifts if np.isfinite(shifts).all() else np.zeros((0, 1))
+    def _shared(self, truth: Truth, run: Trajectory) -> Floats:
+        """Return rows, and instants in the truth and in the run, s, of all that both have (events, 3): touches first.
 
-    def _same(self, shifts: Floats) -> Floats:
-        if shifts.shape != self.whole.shape:
-            raise NotMeasuredError(
-                f"A run of its study shares {len(shifts)} events with the truth, not {len(self.whole)}."
-            )
-        return shifts
+        A run may go on behind the time to which the truth is known: what it does there is none of them.
+        """
+        pairs = matched(truth, truth.compared(run))
+        found = [(a.row, a.touch, b.touch) for a, b in pairs]
+        found += [(a.row, a.release, b.release) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+        shared = np.array(found).reshape(-1, 3)
+        return shared if np.isfinite(shared).all() else np.zeros((0, 3))
+
+    def _same(self, shared: Floats, by: list[int]) -> Floats:
+        """Return the errors of instants that are those of the judged run, each at its place.
+
+        Of as many that are others the difference is no part of an error: they may be any time apart.
+        """
+        if not np.array_equal(shared[:, by], self.shared[:, by]):
+            raise NotMeasuredError("A run of its study does not share the same events with the truth.")
+        return _shifts(shared)
 
     def sizes(self, error: Floats) -> Floats:
         """Return |error|."""
@@ -415,7 +422,15 @@ class Events:
         """Return where the whole error is largest, in words, and what gives the share of a part there."""
         i = int(np.argmax(np.abs(self.whole)))
         sign = -1.0 if self.whole[i, 0] < 0.0 else 1.0
-        pairs = matched(self.truth, self.run)
-        ended = [a.release for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
-        t = [*(a.touch for a, _ in pairs), *ended][i]
-        return f"{'touch' if i < len(pairs) else 'release'} at t = {t:.6g} s", lambda error: sign * float(error[i, 0])
+        touches = len(matched(self.truth, self.truth.compared(self.run)))
+        said = f"{'touch' if i < touches else 'release'} at t = {self.shared[i, 1]:.6g} s"
+        return said, lambda error: sign * float(error[i, 0])
+
+
+_IN_TRUTH, _IN_RUN = [0, 1], [0, 2]
+"""What tells events apart (`Events`): by which instants, beside their rows."""
+
+
+def _shifts(shared: Floats) -> Floats:
+    """Return by how much instants are later in a run than in the truth (events, 1), s."""
+    return shared[:, 2:] - shared[:, 1:2]

@@ -427,8 +427,7 @@ def modes(plain: Plain) -> Iterator[Control]:
     rows, ways, bound = _bounds(plain.case, run)
     for k, row in enumerate(rows):
         slides = still & (run.mode[:, row] == Mode.SLIP) & (bound[:, k] > FAR * float(np.max(np.abs(run.lam))))
-        at = [i for i in plain.samples(slides) if _slips(plain, i, ways[k])]
-        for i in at[:1]:
+        for i in plain.samples(slides & _fast(plain, ways, k))[:1]:
             held = _with(run, "mode", (i, int(row)), Mode.STICK)
             yield Control(fault=f"row {row} slips while STICK", run=held, sees={"mode_contradicted": exactly(1.0)})
             return
@@ -451,11 +450,15 @@ def _misnamed(run: Trajectory) -> Iterator[Control]:
         yield Control(fault="rows below their surface called by another name", run=other, sees=sees)
 
 
-def _slips(plain: Plain, i: int, way: slice) -> bool:
-    """Whether a place slips at a sample with at least a part of the fastest coordinate's speed."""
-    run = plain.run
-    slip = float(np.linalg.norm(slips(plain.case, taken(run, np.array([i])))[0, way]))
-    return slip > TENTH * float(np.max(np.abs(run.v)))
+def _fast(plain: Plain, ways: Sequence[slice], k: int) -> NDArray[np.bool_]:
+    """Return the samples (n,) at which one of several places slips by at least a part of what any moves by, in flight.
+
+    No metric looks where one hardly slips: there is no direction.
+    """
+    rates = slips(plain.case, plain.run)
+    speeds = np.stack([np.linalg.norm(rates[:, way], axis=1) for way in ways])
+    fast: NDArray[np.bool_] = speeds[k] > FAR * float(speeds.max())
+    return fast
 
 
 def _last_contact(plain: Plain) -> tuple[int, float, float] | None:
@@ -604,8 +607,12 @@ def friction(plain: Plain) -> Iterator[Control]:
         slides = plain.run.mode[:, rows[k]] == Mode.SLIP
         lower = bound[:, k] < (1.0 - TENTH) * most  # than the hardest: it tells the bound of each from that of all
         among = slides & (bound[:, k] > TENTH * most)
-        for i in plain.samples(among & lower if (among & lower)[plain.quiet].any() else among)[:1]:
-            yield from _rubbed(plain, i, k)
+        at = plain.samples(among & lower if (among & lower)[plain.quiet].any() else among)[:1]
+        for i in at:
+            yield _exceeded(plain, i, k)
+        for i in plain.samples(among & _fast(plain, ways, k))[:1]:
+            yield from _turned_aside(plain, i, k)
+        if at:
             return
 
 
@@ -648,21 +655,33 @@ def _bounds(case: Case, run: Trajectory) -> tuple[NDArray[np.intp], list[slice],
     return rows, ways, system.friction[rows] * np.where(system.dry[rows], 1.0, run.lam[:, rows])
 
 
-def _rubbed(plain: Plain, i: int, k: int) -> Iterator[Control]:
-    """Change friction of one place at one sample, among its neighbours."""
+def _few(plain: Plain, i: int) -> tuple[Trajectory, int]:
+    """Return a sample's neighbours, with that at which friction is bounded most, and where it is among them."""
     hardest = int(np.argmax(_bounds(plain.case, plain.run)[2].max(axis=1)))
     some = distinct(np.arange(max(i - FEW // 2, 0), min(i + FEW // 2, len(plain.run.t))), hardest)
-    few, i = taken(plain.run, some), int(np.searchsorted(some, i))
+    return taken(plain.run, some), int(np.searchsorted(some, i))
+
+
+def _exceeded(plain: Plain, i: int, k: int) -> Control:
+    """Enlarge friction of one place at one sample, among its neighbours."""
+    few, i = _few(plain, i)
     rows, ways, bound = _bounds(plain.case, few)
-    own, said = np.array(few.lam[i, ways[k]]), f"friction of row {rows[k]}"
-    size = PART * float(np.linalg.norm(own)) / float(bound.max())
+    own = np.array(few.lam[i, ways[k]])
     more = _with(few, "lam", (i, ways[k]), (1.0 + PART) * own)
-    yield Control(fault=f"{said} {PART:g} too large", run=more, plain=few, sees={"cone_violation": exactly(size)})
+    sees = {"cone_violation": exactly(PART * float(np.linalg.norm(own)) / float(bound.max()))}
+    return Control(fault=f"friction of row {rows[k]} {PART:g} too large", run=more, plain=few, sees=sees)
+
+
+def _turned_aside(plain: Plain, i: int, k: int) -> Iterator[Control]:
+    """Turn friction of one place at one sample, among its neighbours; in a plane there is no other way."""
+    few, i = _few(plain, i)
+    rows, ways, _ = _bounds(plain.case, few)
+    own = np.array(few.lam[i, ways[k]])
     if len(own) == 2:
         c, s = np.cos(TENTH), np.sin(TENTH)
         turned = _with(few, "lam", (i, ways[k]), np.array([[c, -s], [s, c]]) @ own)
-        sees = {"friction_angle": exactly(TENTH)}
-        yield Control(fault=f"{said} turned by {TENTH:g} rad", run=turned, plain=few, sees=sees)
+        said = f"friction of row {rows[k]} turned by {TENTH:g} rad"
+        yield Control(fault=said, run=turned, plain=few, sees={"friction_angle": exactly(TENTH)})
 
 
 KINDS: tuple[Callable[[Plain], Iterator[Control]], ...] = (

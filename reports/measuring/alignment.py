@@ -11,6 +11,7 @@ from __future__ import annotations
 from bisect import bisect
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -136,10 +137,10 @@ def aligned(
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run, case, releases)
     inside = _known(truth, t)
-    exact, sides = truth.at(t[inside]), _sides(truth, run, t[inside])
+    exact, (sides, by) = truth.at(t[inside]), _sides(truth, run, t[inside])
     if not np.array_equal(sides, exact.t):
         jumps = truth.at(sides)
-        exact = replace(exact, lam=jumps.lam, mode=jumps.mode)
+        exact = replace(exact, lam=jumps.lam[by], mode=jumps.mode[by])
     return inside, exact
 
 
@@ -157,37 +158,45 @@ def instants(truth: Truth, runs: Iterable[Trajectory], case: Case) -> Iterator[F
     for run in runs:
         for releases in (False, True):
             known = _inside(truth, clock(truth, run, case, releases))
-            yield from (known, _sides(truth, run, known))
+            yield from (known, _sides(truth, run, known)[0])
 
 
 def _inside(truth: Truth, t: Floats) -> Floats:
     return t[_known(truth, t)]
 
 
-def _sides(truth: Truth, run: Trajectory, t: Floats) -> Floats:
-    """Return the instants (n,) at which a truth tells what jumps: its own event where the run tells both sides of it.
+def _sides(truth: Truth, run: Trajectory, t: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the instants (m,) at which a truth tells what jumps, and which of them tells it beside a sample (n,).
 
-    That is one of the same row and mode which is as near as instants are judged to, with no other sample between:
-    between the two events one side alone would be beside both samples of the run, which counts for half a step of it.
+    Where the run tells both sides of events that is the truth's own: the nearest of the same rows and modes, if it is
+    as near as instants are judged to. Between the two one side alone would be beside both samples of the run, which
+    counts for half a step of it. Samples between the two are beside that side on which the run has them.
     """
     theirs: dict[tuple[int, Mode], list[float]] = {}
     for event in truth.trajectory.events:
         theirs.setdefault((event.contact, event.after), []).append(event.t)
-    known, sides, moved = {event.t for event in truth.trajectory.events}, np.array(t), list[slice]()
-    for event in run.events:
-        first, last = (int(np.searchsorted(run.t[: len(t)], event.t, side=side)) for side in ("left", "right"))
+    known, at_events = {event.t for event in truth.trajectory.events}, {event.t for event in run.events}
+    sides, by, moved = np.array(t), np.arange(len(t)), list[slice]()
+    for instant, events in groupby(run.events, key=lambda event: event.t):
+        first, last = (int(np.searchsorted(run.t[: len(t)], instant, side=side)) for side in ("left", "right"))
         if last - first < 2 or (here := float(t[first])) in known:
             continue
-        times = np.array(theirs.get((event.contact, event.after), [np.inf]))
+        times = np.array([at for event in events for at in theirs.get((event.contact, event.after), [])] or [np.inf])
         near = float(times[np.argmin(np.abs(times - here))])
-        if abs(near - here) <= shortest(float(truth.trajectory.t[-1])):
-            sides[first:last] = near
-            moved.append(slice(first, last))
+        if abs(near - here) > shortest(float(truth.trajectory.t[-1])):
+            continue
+        start, end = min(first, int(np.searchsorted(t, near))), max(last, int(np.searchsorted(t, near, side="right")))
+        if at_events.intersection([*run.t[start:first], *run.t[last:end]]):
+            start, end = first, last
+        sides[start:end] = near
+        by[start:first], by[last:end] = first, last - 1
+        moved.append(slice(start, end))
     while wrong := [one for one in moved if _crosses(sides, one)]:
         for one in wrong:
-            sides[one] = t[one]
+            sides[one], by[one] = t[one], np.arange(one.start, one.stop)
             moved.remove(one)
-    return sides
+    asked = by == np.arange(len(t))
+    return sides[asked], (np.cumsum(asked) - 1)[by]
 
 
 def _crosses(t: Floats, one: slice) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +15,7 @@ from places import ROBOTS
 from scipy.spatial.transform import Rotation
 
 from crossbody import cases, engines
-from crossbody.cases import Case, Mode, Tier, Trajectory
+from crossbody.cases import Case, Event, Mode, Tier, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.engines.mujoco._build import MAX_IMPEDANCE, without_regularisation
@@ -291,6 +291,40 @@ def test_without_the_instant_of_one_event_there_are_no_parts_of_their_errors() -
         if Mode.FREE in (run.events[k].before, run.events[k].after) and run.events[k].before != Mode.BALLISTIC:
             lost = (*run.events[:k], replace(run.events[k], t=np.nan), *run.events[k + 1 :])
             assert not Events(ball, truth, replace(run, events=lost)).whole.size, k
+
+
+def bouncing(touches: Sequence[float]) -> Trajectory:
+    """A motion that touches for a hundredth of a second at some instants."""
+    t = np.sort([0.0, 1.0, *touches, *(touch + 0.01 for touch in touches)])
+    wide = np.zeros((len(t), 1))
+    events = (
+        Event(t=touch + late, contact=0, before=before, after=after)
+        for touch in touches
+        for late, before, after in ((0.0, Mode.FREE, Mode.CONTACT), (0.01, Mode.CONTACT, Mode.FREE))
+    )
+    return Trajectory(t=t, q=wide, v=wide, gap=wide, lam=wide, energy=np.zeros((len(t), 2)),
+                      mode=wide.astype(np.int8), events=tuple(events))  # fmt: skip
+
+
+def test_instants_that_runs_share_with_others_of_the_truth_are_no_parts_of_an_error() -> None:
+    """As many they may be: by how far they are apart nothing is off."""
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    truth = from_run(bouncing([0.2, 0.5, 0.8]), Tier.A, "made up")
+    events = Events(ball, truth, bouncing([0.21, 0.51]))
+    assert events.whole[:2].ravel() == pytest.approx([0.01, 0.01])
+    assert events(bouncing([0.2, 0.5])).ravel() == pytest.approx(0.0)
+    with pytest.raises(NotMeasuredError):
+        events(bouncing([0.2, 0.8]))
+    own = from_run(bouncing([0.2, 0.49, 0.8]), Tier.A, "made up")
+    assert events.against(own).ravel() == pytest.approx([0.01, 0.02, 0.01, 0.02])
+
+
+def test_what_a_run_touches_behind_the_time_to_which_its_truth_is_known_is_no_event_of_it() -> None:
+    """Runs of a study end there, or go on: the same engine had other events than itself."""
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    truth = replace(from_run(bouncing([0.2, 0.5]), Tier.A, "made up"), trusted=0.55)
+    short, long = bouncing([0.21]), bouncing([0.21, 0.9])
+    assert np.array_equal(Events(ball, truth, long)(short), Events(ball, truth, short).whole)
 
 
 def test_turns_are_told_by_their_vectors() -> None:

@@ -104,7 +104,7 @@ def test_an_instant_that_stands_twice_is_read_before_what_happens(monkeypatch: p
 
 
 def test_a_truth_that_is_asked_on_one_side_of_a_jump_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(alignment, "_sides", lambda truth, run, t: t)
+    monkeypatch.setattr(alignment, "_sides", lambda truth, run, t: (t, np.arange(len(t))))
     known_sides.wrong.cache_clear()
     try:
         assert {name for name, *_ in known_sides.wrong()} == {"lam_impulse"}

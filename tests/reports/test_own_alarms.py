@@ -285,3 +285,23 @@ def test_pages_of_one_engine_with_several_known_deviations_are_read_as_they_are(
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+WALL = """
+<mujoco><worldbody><geom type="plane" size="5 5 .1" friction=".6 0 0"/>
+<geom type="plane" size="5 5 .1" pos=".5 0 0" euler="0 -90 0" friction=".3 0 0"/>
+<body pos="0 0 .05"><freejoint/><geom type="cylinder" size=".05 .08" mass=".3" friction=".6 0 0"/></body></worldbody>
+<keyframe><key name="roll" qpos="0 0 .05 .7071067811865476 .7071067811865476 0 0" qvel="1 0 0 0 0 -20"/></keyframe>
+</mujoco>
+"""
+
+
+def test_a_can_that_rolls_to_a_wall_in_a_round_number_of_steps(tmp_path: Path) -> None:
+    """A sample stands at the instant of its touch, before it in the run and behind it in the truth, by rounding."""
+    case = robot(tmp_path, WALL, key="roll", t_end=1.0)
+    found = jobs.run_case(case, (jobs.Pick(engine="reference", profile="compiled"),), budget=2.0)
+    run = found.entries[0].run
+    assert run is not None
+    measured = metrics.load("lam_impulse").measure(found.truth, run, found.case)
+    assert measured is not None
+    assert measured < 1e-8

@@ -145,3 +145,17 @@ def test_rows_of_friction_that_are_said_to_touch_are_refused() -> None:
         Law(a0=one, a1=one, a2=0.0 * one, unilateral=~opens, touches=opens)
     with pytest.raises(SceneError, match=r"Rows \[1, 2\] are rows of friction"):
         equations._built(lambda *_: system_of(case), {}, replace(case.law, touches=case.law.unilateral))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_one_that_lets_go_for_less_time_than_instants_are_judged_to_touches_once(seed: int) -> None:
+    """Two rows that switch within nanoseconds do so in an order that no run tells: in the other one has not let go."""
+    rng = np.random.default_rng(seed)
+    case, touch, parted, end = thrown([0.5]), *np.sort(rng.uniform(0.0, END, 3)).tolist()
+    apart = 1e-6 * 10.0 ** rng.uniform(-4.0, 4.0)
+    once, twice = told(case, [(0, touch, end)]), told(case, [(0, touch, parted), (0, parted + apart, end)])
+    for exact, run, sign in ((once, twice, 1.0), (twice, once, -1.0)):
+        for name in ("touch_count", "release_count"):
+            assert measured(name, case, exact, run) == (sign if apart > 1e-6 else 0.0)
+        if apart < 1e-6:
+            assert measured("event_times", case, exact, run) == pytest.approx(0.0, abs=1e-12)
