@@ -324,7 +324,7 @@ class _Walk:
         return None
 
     def _closest(self) -> list[tuple[int, Any]]:
-        """Rows above their surfaces; for `scipy.integrate.solve_ivp` the rate of each gap, which rises where it is least.
+        """Rows above their surfaces; for `scipy.integrate.solve_ivp` the rate of a gap, which rises where it is least.
 
         All are computed at once where the first one is asked for. One that has let go and is below yet touches again
         by its load, not by its gap.
