@@ -19,7 +19,7 @@ import numpy as np
 
 from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._derivatives import residual, saddle
-from crossbody.reference.linear._point import STEP, Point, terms
+from crossbody.reference.linear._point import STEP, Point, force_rate, terms
 
 TURNS = 20  # of Newton's method, which starts beside its solution
 SETTLED = 1e-14  # rad, a turn that is rounding
@@ -46,7 +46,9 @@ def emerging(at: Point, contacts: Sequence[int]) -> Point:
 
 def _spins(at: Point, K: Floats, vd: Floats, lam: Floats) -> Floats:
     q, v = at.q + 1j * STEP * at.system.rates(at.q, at.v, at.t), at.v + 1j * STEP * vd
-    jerk = -np.linalg.solve(K, residual(at, q, v, at.u, vd, lam)[: len(K)].imag / STEP)[: at.system.n]
+    change = residual(at, q, v, at.u, vd, lam)[: len(K)].imag / STEP
+    change[: at.system.n] -= force_rate(at)
+    jerk = -np.linalg.solve(K, change)[: at.system.n]
     moved = _across(at, slip_accelerations(at, q, v, vd).imag / STEP + _tangents(at) @ jerk)
     return -np.asarray(
         np.linalg.solve(_misfit_slopes(at, vd, accelerations_by_turns(at, K, vd, lam)), moved), dtype=np.float64

@@ -13,14 +13,15 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.integrate import solve_ivp
 
-from crossbody.cases import Event, Mode, Outcome, SceneError, Trajectory
+from crossbody.cases import Event, Mode, Outcome, SceneError, Switch, Trajectory
 from crossbody.cases.entry_points import checked_arguments
 from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._simulate import simulate
 from crossbody.reference._system import System, initial_modes
 from crossbody.reference.kinds import Array, Floats
+from crossbody.reference.linear._bends import sided, smooth_switches, watched_gradient, with_sides
 from crossbody.reference.linear._emerging import settled
-from crossbody.reference.linear._point import NO_ROWS, Point, directions, gaps, turning
+from crossbody.reference.linear._point import NO_ROWS, Point, dense, directions, gaps, terms, turning
 from crossbody.reference.linear._rubbing import NoDirectionError
 from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, NOISE, STILL, Slipping
 from crossbody.reference.linear._slipping import AS_ONE as SWITCH_AS_ONE
@@ -36,10 +37,11 @@ from crossbody.reference.linear._variation import (
     rates,
     slip_speeds,
     theta,
+    timed,
 )
 from crossbody.reference.linear.linearisation import point
 
-GRAZING = 1e-12  # part of the terms of g_x f below which an event is only grazed
+GRAZING = 1e-12  # part of the terms of g_x f + g_t below which an event is only grazed
 TOUCHED = 10.0  # times the tolerance, of the largest coordinate, to which a gap is known: one as deep is only grazed
 
 AS_ONE = (
@@ -55,15 +57,15 @@ class Jump:
 
     Attributes:
         t: instant, s.
-        contact: row.
-        before, after: its mode.
+        contact: row, or -1.
+        before, after: its mode; sides of the kink where `contact` is -1, so that a force jumps with no event.
         matrix (2 n, 2 n): the saltation matrix.
     """
 
     t: float
     contact: int
-    before: Mode
-    after: Mode
+    before: Mode | int
+    after: Mode | int
     matrix: Floats
 
 
@@ -79,8 +81,8 @@ class Sensitivity:
         by_parameters (2 n, k): derivative by the parameters.
         names: of the parameters.
         jumps: the events that were passed.
-        outcome: that of the run; ILL_POSED if an event is only grazed, where the derivative does not exist;
-            TIME_LIMIT if the derivatives took longer than asked.
+        outcome: that of the run; ILL_POSED if an event is only grazed, where the derivative does not exist, or
+            if there is none by some variables alone; TIME_LIMIT if the derivatives took longer than asked.
         message: that of the run, or what is grazed or took so long, and when.
     """
 
@@ -95,7 +97,9 @@ class Sensitivity:
 
     @property
     def multipliers(self) -> Array:
-        """Eigenvalues of `by_start` (2 n,), the largest first: Floquet's multipliers of a periodic motion."""
+        """Eigenvalues of `by_start` (2 n,), the largest first, NaN without it: Floquet's of a periodic motion."""
+        if not np.isfinite(self.by_start).all():
+            return np.full(len(self.by_start), complex(np.nan, np.nan))
         found = np.linalg.eigvals(self.by_start)
         return found[np.argsort(-np.abs(found))]
 
@@ -111,8 +115,10 @@ def sensitivity(
     Collisions that follow one another at one instant, as through balls that touch, are passed one by one: the
     derivative is then that of deviations that part the balls, as long as those do not meet again.
 
-    A slip that stops takes the deviations of its velocity with it. Where a contact sticks from the start
-    or from its touch, so do those by which it would slip: they die out within times of their own size.
+    Contacts that are closed at the start stay so in deviations; those that slide from it without a slip have no
+    derivative by what gives them one, which is NaN while the others hold. A slip that stops takes the deviations
+    of its velocity with it. Where a contact sticks from the start or from its touch, so do those by which it would
+    slip: they die out within times of their own size.
 
     Args:
         system: the mechanism, without a sampled controller.
@@ -143,11 +149,13 @@ def sensitivity(
     if any(switch.t > 0.0 and not switch.smooth for switch in run.switches):
         raise SceneError("sensitivity: the motion switches discrete variables; end it before the first switch.")
     walk = _Walk(at, over, rtol, run, time_limit)
-    outcome, n, nq = walk.within_time(run, t_end) if run.outcome.ok else run.outcome, system.n, system.nq
+    outcome, n = walk.within_time(run, t_end) if run.outcome.ok else run.outcome, system.n
     if not outcome.ok:
         walk.S[:] = np.nan
-    elif not (_same(walk.x[:nq], run.q) and _same(walk.x[nq:], run.v)):
+    elif not walk.ends_as(run):
         raise SceneError(AS_ONE)  # touching rows share an impulse of which one event tells
+    if walk.lost.any():
+        walk.S[:, walk.lost], outcome = np.nan, Outcome.ILL_POSED if outcome.ok else outcome
     return Sensitivity(
         run=run, state=walk.x, by_start=walk.S[:, : 2 * n], by_parameters=walk.S[:, 2 * n :],
         names=over.names, jumps=tuple(walk.jumps), outcome=outcome, message=walk.message or run.message,
@@ -163,11 +171,6 @@ def _at(here: Point, t: float, y: Floats) -> Point:
     """The point at a time and a state, with the rows in contact as they are."""
     nq = here.system.nq
     return replace(here, t=t, q=y[:nq].copy(), v=y[nq : nq + here.system.n].copy())
-
-
-def _same(end: Floats, motion: Floats) -> bool:
-    """Whether a motion (N, n) ends there."""
-    return bool(np.abs(end - motion[-1]).max() <= SAME * np.abs(motion).max(initial=1e-300))
 
 
 class _OutOfTimeError(Exception):
@@ -186,6 +189,7 @@ class _Walk:
         self.modes = initial_modes(system, at.q, at.v).astype(int).tolist()
         self.jumps: list[Jump] = []
         self.message = ""
+        self.lost = np.zeros(self.S.shape[1], dtype=bool)
         self.refusal: SceneError | None = None
         slipped, still = slip_speeds(at, run), max(STILL, NOISE * rtol)
         self.slipping = Slipping(
@@ -205,11 +209,20 @@ class _Walk:
         """Go to the end; FINISHED, or how the derivative was lost."""
         now, rubs = 0.0, self.at.system.frictional
         if rubs and not (run.events and run.events[0].t == 0.0):
-            self.x[self.at.system.nq :] = self.slipping.hold(self._here(0.0), self.S)
-        for t, group in groupby(run.events, key=lambda event: event.t):
+            here = self._here(0.0)
+            self._begin(here, here.sliding.tolist())
+            self.x[self.at.system.nq :] = self.slipping.hold(here, self.S)
+        passed: list[Event | Switch] = [*run.events, *smooth_switches(run)]
+        for t, group in groupby(sorted(passed, key=lambda one: one.t), key=lambda one: one.t):
             if not (self._begins(now, t) and self._smooth(now, t)):
                 return Outcome.ILL_POSED
-            now, events = t, list(group)
+            now, both = t, list(group)
+            events = [one for one in both if isinstance(one, Event)]
+            if not self._bend([one for one in both if isinstance(one, Switch)], alone=not events):
+                self.message = f"The end of a face, or of a range of a force, is only grazed at t = {t:.9g} s."
+                return Outcome.ILL_POSED
+            if not events:
+                continue
             if (row := self._only_touches(events)) is not None:
                 self.message = f"The gap of row {row} is only grazed at t = {t:.9g} s."
                 return Outcome.ILL_POSED
@@ -220,6 +233,40 @@ class _Walk:
         if not (self._begins(now, t_end) and self._smooth(now, t_end)):
             return Outcome.ILL_POSED
         return Outcome.FINISHED if np.isfinite(self.S).all() else Outcome.NOT_FINITE
+
+    def ends_as(self, run: Trajectory) -> bool:
+        """Whether the end is that of the motion, as far as its size and what acts on it let that be known."""
+        nq, known = self.at.system.nq, NOISE * self.rtol
+        blocks, f, *_ = terms(self.at, self.at.q, self.at.v, self.at.u)
+        speed, T = float(np.abs(np.linalg.solve(dense(blocks), f)).max(initial=0.0) * run.t[-1]), float(run.t[-1])
+        parts = ((self.x[:nq], run.q, speed * T), (self.x[nq:], run.v, speed))
+        return all(np.abs(x - y[-1]).max() <= SAME * np.abs(y).max() + known * floor for x, y, floor in parts)
+
+    def _begin(self, here: Point, rows: list[int]) -> None:
+        """Let variables go by which there is no derivative, since contacts among these slide from no slip there."""
+        found, lost = self.slipping.begun(here, self.S, rows)
+        lost &= ~self.lost
+        if lost.any():
+            self.lost |= lost
+            self.S[:, lost] = 0.0
+            self.message = self.message or (
+                f"Row {found[0]} begins to slide from rest at t = {here.t:.9g} s: by what gives it a slip there, "
+                "derivatives are one-sided at most (NaN); the others hold."
+            )
+
+    def _bend(self, group: list[Switch], *, alone: bool) -> bool:
+        """Pass kinks of one instant, at which a force may jump; False if that is only grazed."""
+        if not group:
+            return True
+        t, here = group[0].t, self._here(group[0].t, "left")
+        sides = ({s.variable: getattr(s, name) for s in group} for name in ("before", "after"))
+        old, new = (rates(with_sides(here, side)) for side in sides)
+        if np.abs(new - old).max() <= ALIKE * np.abs(old).max():
+            return True
+        if len(group) > 1 or not alone:
+            raise SceneError(SWITCH_AS_ONE.format(t=t))
+        g = watched_gradient(here, self.over, group[0], self.rtol)
+        return self._jump(group, g, np.eye(len(old), self.S.shape[1]), old, new)
 
     def _lasting(self, group: list[Event]) -> list[Event]:
         """Events of one instant without those of rows that touch and let go again there: nothing has pressed."""
@@ -277,9 +324,10 @@ class _Walk:
         return None
 
     def _closest(self) -> list[tuple[int, Any]]:
-        """Rows out of contact, and for `scipy.integrate.solve_ivp` the rate of each gap, which rises where it is least.
+        """Rows above their surfaces; for `scipy.integrate.solve_ivp` the rate of a gap, which rises where it is least.
 
-        All are computed at once where the first one is asked for.
+        All are computed at once where the first one is asked for. One that has let go and is below yet touches again
+        by its load, not by its gap.
         """
         nc, at, rates_then = self.at.system.nc, math.nan, np.zeros(self.at.system.nc)
 
@@ -294,7 +342,7 @@ class _Walk:
             rate.terminal, rate.direction = False, 1.0  # type: ignore[attr-defined]
             return rate
 
-        return [(i, follow(i)) for i in self._open()]
+        return [(i, follow(i)) for i in self._open() if self.modes[i] == Mode.FREE]
 
     def _here(self, t: float, side: str = "right") -> Point:
         """The state at t with the rows and constants of the present modes; slips as the motion has them beside it."""
@@ -320,6 +368,7 @@ class _Walk:
 
         A slip in space that begins turns at any rate, so that it takes an implicit method.
         """
+        self.at = sided(self.at, self.run, start, end)  # also of what is looked at where it ends
         while end > start:
             here = self._here(start)
             ends, stiff = self.slipping.turns(here)
@@ -396,6 +445,7 @@ class _Walk:
     def _switch(self, group: list[Event]) -> bool:
         """Pass all events of one instant: what fell to zero, and what follows from it; False if it is only grazed."""
         t, width, changes = group[0].t, 2 * self.at.system.n, list[Floats]()
+        new_here = [e.contact for e in group if e.before not in (Mode.STICK, Mode.SLIP)]
         old = np.zeros(width)
         if t > 0.0:
             before, k = self._here(t, "left"), self._sample(t, "left")
@@ -415,17 +465,18 @@ class _Walk:
                 raise SceneError(SWITCH_AS_ONE.format(t=t))
             if known:
                 self._jump(group, changes[0], R, old, new)
+        self._begin(after, new_here)
         self.x[self.at.system.nq :] = self.slipping.hold(after, self.S)
         return True
 
     def _shift(self, g: Floats, old: Floats) -> Floats | None:
         """By how much an event moves in time with every variable; None if it is only grazed."""
-        width = len(old)
-        speed = float(g[:width] @ old)
-        if not abs(speed) > GRAZING * float(np.abs(g[:width]) @ np.abs(old)):
+        width, by_time = len(old), float(g[-1])
+        speed = float(g[:width] @ old) + by_time
+        if not abs(speed) > GRAZING * (float(np.abs(g[:width]) @ np.abs(old)) + abs(by_time)):
             return None
         change = g[:width] @ self.S
-        change[width:] += g[width:]
+        change[width:] += g[width:-1]
         return -change / speed
 
     def _event(self, piece: list[Event]) -> bool:
@@ -452,7 +503,7 @@ class _Walk:
         new = rates(self._here(event.t))
         return self._jump(piece, guard, R, old, new)
 
-    def _jump(self, piece: list[Event], g: Floats, R: Floats, old: Floats, new: Floats) -> bool:
+    def _jump(self, piece: Sequence[Event | Switch], g: Floats, R: Floats, old: Floats, new: Floats) -> bool:
         width, shift = len(old), self._shift(g, old)
         if shift is None:
             return False
@@ -460,22 +511,23 @@ class _Walk:
         S = R[:, :width] @ self.S + np.outer(kick, shift)
         S[:, width:] += R[:, width:]
         self.S = S
-        matrix = R[:, :width] - np.outer(kick, g[:width]) / float(g[:width] @ old)
+        matrix = R[:, :width] - np.outer(kick, g[:width]) / (float(g[:width] @ old) + float(g[-1]))
+        contact = piece[0].contact if isinstance(piece[0], Event) else -1
         self.jumps.append(
-            Jump(t=piece[0].t, contact=piece[0].contact, before=piece[0].before, after=piece[-1].after, matrix=matrix)
+            Jump(t=piece[0].t, contact=contact, before=piece[0].before, after=piece[-1].after, matrix=matrix)
         )
         return True
 
     def _guard(self, event: Event, here: Point) -> Floats | None:
-        """Gradient of what fell to zero; None where nothing changes but a label."""
+        """Gradient of what fell to zero, by (dq, v, theta, t); None where nothing changes but a label."""
         i, before, after = event.contact, event.before, event.after
         if before is Mode.FREE:
-            return gap_gradient(here, self.over, i)
+            return timed(gap_gradient(here, self.over, i))
         if before is Mode.COLLISION and after is Mode.CONTACT:
             return handover_gradient(here, self.over, i)
         if before in ACTIVE:
             return lam_gradient(here, self.over, i)
-        return None if after is Mode.FREE else gap_gradient(here, self.over, i, rate=True)
+        return None if after is Mode.FREE else timed(gap_gradient(here, self.over, i, rate=True))
 
 
 def _pieces(events: list[Event]) -> Iterator[list[Event]]:

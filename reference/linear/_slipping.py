@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Event, Mode, SceneError, Trajectory
 from crossbody.reference._system import System
@@ -31,6 +32,7 @@ from crossbody.reference.linear._variation import (
     slip_gradient,
     slips,
     slopes,
+    timed,
 )
 
 ACTIVE = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
@@ -184,13 +186,13 @@ class Slipping:
         """By how much contact i is below its bound, over that, and its rate."""
         value, gradient, bound = cone_gradient(at, self.over, i)
         f = rates(at)
-        return value / bound, float(gradient[: len(f)] @ f) / bound
+        return value / bound, float(gradient[: len(f)] @ f + gradient[-1]) / bound
 
     def _shares(self, here: Point, i: int) -> bool:
         return bool(np.isin([i, *here.active[here.tangents(i)]], here.sharing).any())
 
     def reached(self, e: Event, here: Point, k: int) -> Floats | None:
-        """Gradient of what fell to zero at an event; None if nothing did, so that it follows from another.
+        """Gradient, by (dq, v, theta, t), of what fell to zero at an event; None if it follows from another.
 
         Args:
             e: the event.
@@ -209,7 +211,7 @@ class Slipping:
         elif e.before is Mode.SLIP and e.after in (Mode.STICK, Mode.SLIP):
             slip, size = slips(here, here.q, here.v, i), self.speed
             all_ways, n = slip_gradient(here, self.over, i), self.system.n
-            value, gradient = float(np.linalg.norm(slip)), self._way(i, k) @ all_ways
+            value, gradient = float(np.linalg.norm(slip)), timed(self._way(i, k) @ all_ways)
             in_space = np.linalg.matrix_rank(all_ways[:, n : 2 * n]) > 1
             if value <= NONE * size and e.after is Mode.SLIP and in_space:
                 raise SceneError(TURNS_BACK.format(i=i, t=e.t))
@@ -222,13 +224,29 @@ class Slipping:
             value = gaps(here, here.q, here.v)[i + self.system.nc * rate]
             size, gradient = (
                 float(np.abs(here.v if rate else here.q).max()),
-                gap_gradient(here, self.over, i, rate=rate),
+                timed(gap_gradient(here, self.over, i, rate=rate)),
             )
         return gradient if abs(value) <= NONE * abs(size) else None
 
     def _load(self) -> float:
         """Largest multiplier of the motion."""
         return float(np.abs(self.run.lam).max())
+
+    def begun(self, here: Point, S: Floats, rows: Sequence[int]) -> tuple[list[int], NDArray[np.bool_]]:
+        """Contacts among these that begin to slide from no slip, and the variables (2 n + k,) that give them one.
+
+        By these the motion has one-sided derivatives at most: friction is against whatever slip there is.
+        """
+        n, found, lost = self.system.n, list[int](), np.zeros(S.shape[1], dtype=bool)
+        for i in rows:
+            if i not in here.sliding or np.linalg.norm(slips(here, here.q, here.v, i)) > GRAZED * self.speed:
+                continue
+            gradient = slip_gradient(here, self.over, i)
+            change = gradient[:, : 2 * n] @ S
+            change[:, 2 * n :] += gradient[:, 2 * n :]
+            lost |= (np.abs(change) > NONE * np.abs(gradient).max()).any(axis=0)
+            found.append(i)
+        return found, lost
 
     def hold(self, here: Point, S: Floats) -> Floats:
         """Let deviations S (2 n, ...) by which contacts that stick would slip die out, in place; the velocity (n,).

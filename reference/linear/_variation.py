@@ -3,7 +3,7 @@
 At an event g(x, theta) = 0 with x+ = R(x-, theta) the derivative S of the motion jumps (Leine and
 Nijmeijer 2004, chapter 7; R is the identity except at a frozen collision):
 
-    S+ = R_x S- + R_theta + (R_x f- - f+) dtau        dtau = -(g_x S- + g_theta)/(g_x f-)
+    S+ = R_x S- + R_theta + (R_x f- - f+) dtau        dtau = -(g_x S- + g_theta)/(g_x f- + g_t)
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from crossbody.reference._system import System
 from crossbody.reference.kinds import Array, Floats
 from crossbody.reference.linear._derivatives import implied, residual, saddle
 from crossbody.reference.linear._emerging import accelerations_by_turns, by_turns, slip_accelerations, with_turns
-from crossbody.reference.linear._point import STEP, Point, dense, directions, gaps, rubbing, terms
+from crossbody.reference.linear._point import STEP, Point, dense, directions, force_rate, gaps, rubbing, terms
 from crossbody.reference.linear._rubbing import borne, loads
 
 HANDOVER = 0.01  # elastic part of lam at which COLLISION becomes CONTACT (docs/explanation/model.md)
@@ -103,23 +103,31 @@ def _turning(at: Point, over: Theta, vd: Floats, found: Floats, turn: Floats) ->
     """Derivatives of (v', ...) with the directions of slips that emerge turning, by `with_turns`."""
     if not len(at.emerging):
         return found
-    return with_turns(at, vd, found, turn, gradient(lambda here, q, v: slip_accelerations(here, q, v, vd), at, over))
+    moved = gradient(lambda here, q, v: slip_accelerations(here, q, v, vd), at, over)
+    return with_turns(at, vd, found, turn, np.pad(moved, ((0, 0), (0, found.shape[1] - moved.shape[1]))))
 
 
 def slopes(at: Point, over: Theta) -> tuple[Floats, Floats, Floats]:
-    """Rates (v, v') (2 n,), multipliers (na,), and the derivatives of (v', lam) by (dq, v, theta).
+    """Rates (v, v') (2 n,), multipliers (na,), and the derivatives of (v', lam) by (dq, v, theta, t).
 
     Raises:
         SceneError: where the active rows are redundant or a value is not finite.
     """
     K, vd, lam = saddle(at)
     columns = gradient(lambda here, q, v: residual(here, q, v, at.u, vd, lam), at, over)
-    bearing = gradient(lambda here, q, v: loads(here, q, v, at.u, lam), at, over)
+    bearing = timed(gradient(lambda here, q, v: loads(here, q, v, at.u, lam), at, over))
+    columns = timed(columns)
+    columns[: at.system.n, -1] = -force_rate(at)
     every = borne(at, terms(at, at.q, at.v, at.u)[2], at.v, lam)
     found = np.vstack(implied(at, K, columns, bearing))
     columns = by_turns(lambda here: residual(here, at.q, at.v, at.u, vd, lam), at)
     turn = np.vstack(implied(at, K, columns, by_turns(lambda here: loads(here, at.q, at.v, at.u, lam), at)))
     return np.concatenate([at.v, vd]), every, _turning(at, over, vd, found, turn)
+
+
+def timed(found: Floats) -> Floats:
+    """Append to derivatives by (dq, v, theta) that by the time itself of what does not read it."""
+    return np.concatenate([found, np.zeros((*found.shape[:-1], 1))], axis=-1)
 
 
 def rate_slopes(at: Point, over: Theta) -> Floats:
@@ -161,10 +169,10 @@ def slip_gradient(at: Point, over: Theta, i: int) -> Floats:
 
 
 def cone_gradient(at: Point, over: Theta, i: int) -> tuple[float, Floats, float]:
-    """By how much contact i, which sticks, is below its bound: value, gradient, and the bound."""
+    """By how much contact i, which sticks, is below its bound: value, gradient by (dq, v, theta, t), and the bound."""
     _, lam, slope = slopes(at, over)
     n, places, mu = at.system.n, at.tangents(i), at.system.friction[i]
-    changed = gradient(lambda here, q, v: here.given("friction")[i : i + 1], at, over)[0]
+    changed = timed(gradient(lambda here, q, v: here.given("friction")[i : i + 1], at, over)[0])
     size, lam_x = float(np.linalg.norm(lam[places])), slope[n:]
     rate = lam[places] @ lam_x[places] / size if size > 0.0 else np.zeros(lam_x.shape[1])
     if at.system.dry[i]:
@@ -174,13 +182,13 @@ def cone_gradient(at: Point, over: Theta, i: int) -> tuple[float, Floats, float]
 
 
 def lam_gradient(at: Point, over: Theta, i: int) -> Floats:
-    """Of the multiplier of row i, which is active."""
+    """Of the multiplier of row i, which is active, by (dq, v, theta, t)."""
     found: Floats = slopes(at, over)[2][at.system.n + at.active.tolist().index(i)]
     return found
 
 
 def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
-    """Of max(b1, sqrt(b0)) |h'| + b0 |h| - HANDOVER lam_i/(G^-1)_ii, where a collision is spent."""
+    """Of max(b1, sqrt(b0)) |h'| + b0 |h| - HANDOVER lam_i/(G^-1)_ii, where a collision is spent; t the last."""
     j, n = at.active.tolist().index(i), at.system.n
     _, lam, slope = slopes(at, over)
     b0, b1, _ = at.system.beta[i]
@@ -198,7 +206,7 @@ def handover_gradient(at: Point, over: Theta, i: int) -> Floats:
         return 1.0 / np.linalg.inv(G)[j, j : j + 1]
 
     share = mobility(at, at.q, at.v)[0].real
-    change = gradient(elastic, at, over)[0] - HANDOVER * lam[j] * gradient(mobility, at, over)[0]
+    change = timed(gradient(elastic, at, over)[0] - HANDOVER * lam[j] * gradient(mobility, at, over)[0])
     found: Floats = change - HANDOVER * share * slope[n + j]
     return found
 
