@@ -30,7 +30,8 @@ NEEDLESS = {
 }  # fmt: skip
 WARM = (
     "crossbody.reference.core.advance", "crossbody.reports.judging.known_answers",
-    "crossbody.reports.judging.known_engines",
+    "crossbody.reports.judging.known_drives", "crossbody.reports.judging.known_engines",
+    "crossbody.reports.judging.known_scenes",
 )  # fmt: skip
 """What the first run of a version of the code asks for, and keeps."""
 
