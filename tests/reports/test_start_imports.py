@@ -24,6 +24,7 @@ def noted(*given, **asked):
 cli._do = noted
 entry.main()
 """
+ROBOT = Path(__file__).parents[1] / "support" / "driven_ball.xml"
 NEEDLESS = {
     "numpy.ma", "pandas", "scipy.integrate", "scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.sparse",
     "scipy.spatial", "yaml",
@@ -49,6 +50,7 @@ def modules(tmp_path: Path, *words: str) -> set[str]:
     [
         ("bouncing_ball:resting", "reference:compiled"), ("sliding_block:stops", "reference:compiled"),
         ("bouncing_ball:listing", "reference:compiled"), ("bouncing_ball:resting", "mujoco"),
+        (str(ROBOT), "mujoco"),
     ],
 )  # fmt: skip
 def test_a_run_imports_nothing_that_it_does_not_need(case: str, engine: str, tmp_path: Path) -> None:
