@@ -46,7 +46,7 @@ CLAIMS = {
     "penetration": (1e-5, "the deepest sample, not the deepest instant"),
 }
 
-OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1) and, unless set, a step of 2 ms."
+OBVIOUS = "The obvious model has MuJoCo's own contact constants (solref 0.02 1), and its step is 2 ms unless set."
 IMPACT = (
     "An instantaneous impact has no contact phase: a restitution replaces the law, so the ball "
     "neither sinks in nor stays in contact for a time in which its weight acts."

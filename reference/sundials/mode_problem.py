@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from itertools import islice, product
 
 import numpy as np
-from scipy.optimize import root
 
 from crossbody.cases import Mode
 from crossbody.reference.kinds import Array, Floats
@@ -180,6 +179,8 @@ class ModeProblem:
 
         found = self._solved(modes, dict(ways))
         if free and max(abs(self._across(found, i)) for i in free) > self.limit:
+            from scipy.optimize import root  # which takes longer to import than a short run
+
             start = np.array([np.arctan2(ways[i][1], ways[i][0]) for i in free])
             angles = root(aside, start, tol=1e-13).x
             found = self._solved(modes, turned(angles)) if np.isfinite(angles).all() else found

@@ -53,9 +53,8 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
             or name in near.untold
         )
 
-    for name, value, (least, most), fault in (
-        *unseen(case, truth, outside), *unheard(case), *_unruled(case), *known.wrong(file=bool(case.file), ran=ran),
-    ):  # fmt: skip
+    answers = known.wrong(file=bool(case.file), scene=not _plain(case), ran=ran)
+    for name, value, (least, most), fault in (*unseen(case, truth, outside), *unheard(case), *_unruled(case), *answers):
         if least <= value <= most:
             why = f"A control passes: {fault} is no number outside."
         else:
@@ -64,6 +63,12 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
     for name, fault in _unsaid(near):
         word = next((one for one in WRONG if exit_code([one])), Word.OUTSIDE)
         yield of_truth(case, f"{name} (control)", f"A control passes: {fault}.", command, verdict=word)
+
+
+def _plain(case: Case) -> bool:
+    """Whether a case has equations of its own, without friction, and nothing drives it."""
+    driven = (case.control, case.inputs, case.force, case.gates, case.form)
+    return case.scene is not None and not case.general and all(one is None for one in driven)
 
 
 WRONG = (Word.OUTSIDE, Word.CRASHED)

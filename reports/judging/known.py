@@ -32,8 +32,10 @@ KINDS = (
 )  # fmt: skip
 OF_FILES = ("judging.known_files",)
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
-OF_ENGINES = ("judging.known_engines", "judging.known_contacts")
-"""Of an engine that runs, beside: others are not imported for it."""
+OF_SCENES = ("judging.known_scenes",)
+"""Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""
+OF_ENGINES, OF_DRIVES = ("judging.known_engines", "judging.known_contacts"), ("judging.known_drives",)
+"""Of an engine that runs, beside: others are not imported for it; and of its motors, likewise with those of scenes."""
 OF_COMMANDS = {
     "replay": ("replay.known_replay", "replay.known_fits", "replay.known_formats"), "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
@@ -48,18 +50,23 @@ once = False
 """Whether what was right is believed: where a command has a process of its own, so that nobody replaced functions."""
 
 
-def wrong(*, file: bool = False, ran: Iterable[str] = ()) -> Iterator[Found]:
+def wrong(*, file: bool = False, scene: bool = False, ran: Iterable[str] = ()) -> Iterator[Found]:
     """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another.
 
     Args:
         file: whether a file is run: then those of readers of files are asked too.
+        scene: whether a scene is run, or what drives a case: then friction, motors and controllers are asked for too.
         ran: engines that run: each of crossbody's own is asked for its answers.
     """
     yield from _once(RUNS, KINDS)
     if file:
         yield from _once(f"{RUNS}_files", OF_FILES)
+    if scene:
+        yield from _once(f"{RUNS}_scenes", OF_SCENES)
     for name in sorted(set(ran) & set(engines.REGISTRY.own())):
         yield from _once(f"{RUNS}_{name}", OF_ENGINES, name)
+        if scene:
+            yield from _once(f"{RUNS}_drives_{name}", OF_DRIVES, name)
 
 
 def check(command: str) -> None:

@@ -1,7 +1,7 @@
 """What audits must say of engines that are wrong by a known amount, and must not of those that are right.
 
 An audit that passes anything passes every engine. So each is handed what is off: steps that are too long, a setting
-that did not arrive, equations of another motor, and a ball that an engine written here lets fall with a per cent too
+that did not arrive, and a ball that an engine written here lets fall with a per cent too
 much weight, or moves by its speed of the step before. And what a tolerance hides, and what stands between samples, is
 known.
 """
@@ -19,27 +19,23 @@ import numpy as np
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Outcome, Trajectory
 from crossbody.cases.between import between
-from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Actuator, Body, Joint, Scene
 from crossbody.engines.contract import Engine, Run
-from crossbody.engines.equations import equations_of
 from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.judging.audit import settings_kept
 from crossbody.reports.judging.first_steps import first_steps
-from crossbody.reports.judging.forces_of_scene import forces_against
 from crossbody.reports.judging.run_verdicts import Entry, looser
 from crossbody.reports.judging.steps_taken import miscounted
 
 STEP, STEPS, FALL = 0.01, 100, 1e-3
 """Of a made-up record, s, and their number; step of a ball that falls, s."""
 LITTLE, SOME = 1e-6, 0.01
-"""By which a setting and a motor, and the weight of a ball, are off."""
+"""By which a setting, and the weight of a ball, are off."""
 
 
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return the audit, its number, least and most, and of what, where it is another one."""
-    kinds = (_steps, _settings, _forces, _falls, _loose, _between)
+    kinds = (_steps, _settings, _falls, _loose, _between)
     return unlike(kinds, "audit", "an engine, which ends in")
 
 
@@ -70,27 +66,6 @@ def _settings() -> Iterator[Within]:
     ):  # fmt: skip
         found = sum(not row.ok for row in settings_kept({"set": own}, used))
         yield "settings", f"settings {what}", float(found), float(told), 0.0
-
-
-def _cart(gain: float = 3.0, most: float = 5.0, damping: float = 0.4) -> Case:
-    body = Body(name="cart", mass=2.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    rail = Joint(name="rail", body="cart", type="slide", axis=(1.0, 0.0, 0.0), damping=(damping, 0.1, 0.2))
-    motor = Actuator(
-        name="motor", joint="rail", gain=(gain, 0.0, 0.0), bias=(0.0, -2.0, -0.1), force_range=(-4.0, most)
-    )  # fmt: skip
-    return case_of(Scene(bodies=(body,), joints=(rail,), actuators=(motor,)), name="cart", t_end=1.0)
-
-
-def _forces() -> Iterator[Within]:
-    """Yield how many rows say that equations have other forces than a scene."""
-    case = _cart()
-    more = 1.0 + LITTLE
-    for what, other, told in (
-        ("its own", case, 0), ("another gain", _cart(gain=3.0 * more), 1), ("another range", _cart(most=5.0 * more), 1),
-        ("another damper", _cart(damping=0.4 * more), 1),
-    ):  # fmt: skip
-        found = sum(not row.ok for row in forces_against(case, equations_of(other)))
-        yield "forces", f"a cart with {what}", float(found), float(told), 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -39,7 +39,7 @@ TRUTH = truth_of(BALL)
 @pytest.fixture(scope="module", autouse=True)
 def _known_before() -> None:
     """Ask for the known answers, which are asked once a process, while no metric is another one."""
-    assert [*known.wrong()] == []
+    assert [*known.wrong(scene=True)] == []
 
 
 def blind(case: Case, truth: Truth) -> list[Verdict]:

@@ -7,7 +7,15 @@ from typing import Any
 
 import pytest
 
-from crossbody.reports.judging import audit, first_steps, forces_of_scene, known_audits, run_verdicts, steps_taken
+from crossbody.reports.judging import (
+    audit,
+    first_steps,
+    forces_of_scene,
+    known_audits,
+    known_scenes,
+    run_verdicts,
+    steps_taken,
+)
 
 
 def row(off: float, quantity: str, *_: Any) -> audit.AuditRow:
@@ -27,13 +35,14 @@ OFF: dict[str, tuple[Any, str, Any, str]] = {
 
 
 def test_audits_as_they_are_give_their_answers() -> None:
-    assert known_audits.wrong() == ()
+    assert (*known_audits.wrong(), *known_scenes.wrong()) == ()
 
 
 @pytest.mark.parametrize("what", OFF)
 def test_an_audit_that_is_another_one_is_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     module, name, other, told = OFF[what]
     monkeypatch.setattr(module, name, other)
-    known_audits.wrong.cache_clear()
-    assert told in {found for found, *_ in known_audits.wrong()}
-    known_audits.wrong.cache_clear()
+    kind = known_scenes if what == "forces" else known_audits
+    kind.wrong.cache_clear()
+    assert told in {found for found, *_ in kind.wrong()}
+    kind.wrong.cache_clear()

@@ -10,7 +10,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, EngineUnavailable, Inputs, Outcome
-from crossbody.reports.judging import known_engines
+from crossbody.reports.judging import known_drives, known_engines
 from crossbody.reports.judging.steps_taken import miscounted
 
 
@@ -20,7 +20,7 @@ def test_engines_give_their_known_answers(name: str) -> None:
         engines.load(name)
     except EngineUnavailable as missing:
         pytest.skip(str(missing))
-    assert known_engines.wrong(name) == ()
+    assert (*known_engines.wrong(name), *known_drives.wrong(name)) == ()
 
 
 @pytest.mark.parametrize(("given", "what"), [({"rtol": 1e-8}, "(steps)"), ({"max_steps": 10_000}, "(max_steps)")])
@@ -44,11 +44,11 @@ def test_the_motion_of_a_motor_that_lags_is_that_of_its_equations() -> None:
     from scipy.integrate import solve_ivp
 
     def rates(u: float) -> Any:
-        return lambda _, y: [y[1], known_engines.GAIN / known_engines.MASS * y[2], (u - y[2]) / known_engines.LAG]
+        return lambda _, y: [y[1], known_drives.GAIN / known_drives.MASS * y[2], (u - y[2]) / known_drives.LAG]
 
-    state, wanted = np.array([known_engines.AT, known_engines.FAST, 0.0]), known_engines.motion()
-    for u, after in zip(known_engines.CONTROLS, wanted[1:], strict=True):
-        state = solve_ivp(rates(u), (0.0, known_engines.TICK), state, rtol=1e-11, atol=1e-13).y[:, -1]
+    state, wanted = np.array([known_drives.AT, known_drives.FAST, 0.0]), known_drives.motion()
+    for u, after in zip(known_drives.CONTROLS, wanted[1:], strict=True):
+        state = solve_ivp(rates(u), (0.0, known_drives.TICK), state, rtol=1e-11, atol=1e-13).y[:, -1]
         assert state == pytest.approx(after, rel=1e-8)
 
 

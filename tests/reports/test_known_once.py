@@ -108,7 +108,7 @@ def test_a_process_that_others_share_asks_every_time(monkeypatch: pytest.MonkeyP
 
 def test_all_that_answers_are_made_of_is_in_the_digest() -> None:
     """Modules that only name others, and the digest itself, decide nothing."""
-    ask = "from crossbody.reports.judging import known; list(known._asked())"
+    ask = "from crossbody.reports.judging import known; list(known._asked((*known.KINDS, *known.OF_SCENES)))"
     tell = "import sys; print(*(n for n in sys.modules if n.startswith('crossbody.')))"
     told = subprocess.run([sys.executable, "-c", f"{ask}; {tell}"], capture_output=True, text=True, check=True).stdout
     within = [f"crossbody.{folder[3:]}" for folder in sources.SHOWN if folder.startswith("../")]

@@ -24,13 +24,15 @@ def noted(*given, **asked):
 cli._do = noted
 entry.main()
 """
+ROBOT = Path(__file__).parents[1] / "support" / "driven_ball.xml"
 NEEDLESS = {
     "numpy.ma", "pandas", "scipy.integrate", "scipy.interpolate", "scipy.linalg", "scipy.optimize", "scipy.sparse",
     "scipy.spatial", "yaml",
 }  # fmt: skip
 WARM = (
     "crossbody.reference.core.advance", "crossbody.reports.judging.known_answers",
-    "crossbody.reports.judging.known_engines",
+    "crossbody.reports.judging.known_drives", "crossbody.reports.judging.known_engines",
+    "crossbody.reports.judging.known_scenes",
 )  # fmt: skip
 """What the first run of a version of the code asks for, and keeps."""
 
@@ -48,6 +50,7 @@ def modules(tmp_path: Path, *words: str) -> set[str]:
     [
         ("bouncing_ball:resting", "reference:compiled"), ("sliding_block:stops", "reference:compiled"),
         ("bouncing_ball:listing", "reference:compiled"), ("bouncing_ball:resting", "mujoco"),
+        (str(ROBOT), "mujoco"),
     ],
 )  # fmt: skip
 def test_a_run_imports_nothing_that_it_does_not_need(case: str, engine: str, tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crossbody import cases
+from crossbody.cases.defaults import limits_of
 from crossbody.reports.importers.compare import OK, QUANTITIES, Row
 from crossbody.reports.importers.told import grid
 from crossbody.reports.judging.told import NAMED, known_until, runs_of, sentence
@@ -184,3 +186,11 @@ def test_a_truth_in_doubt_is_no_run_that_is_off() -> None:
     said = sentence(runs_of(rows))
     assert said.startswith("The run is within all limits. In doubt: truth on ")
     assert "Off" not in said
+
+
+@pytest.mark.parametrize("name", cases.names())
+def test_the_sentence_ends_with_a_whole_clause_of_a_known_cause(name: str) -> None:
+    for cause in {limit.known for limit in limits_of(cases.load(name)) if limit.known}:
+        finished, *others = rows_of("ball:hard", "expected", 20.0)
+        said = sentence(runs_of([finished, *(one | {"why": cause} for one in others)])).removesuffix(".").split()
+        assert said[-1] not in ("a", "an", "and", "but", "for", "in", "model", "of", "or", "the", "with"), said

@@ -121,7 +121,7 @@ TOGETHER = (
     "where collisions overlap the law itself makes energy."
 )
 OBVIOUS = (
-    "The obvious model: spheres with friction, an elastic contact that MuJoCo's own step of 2 "
+    "The obvious model has spheres with friction, an elastic contact that MuJoCo's own step of 2 "
     "ms just resolves (solref -10000 0) and Euler's method, not the case's law."
 )
 AT_ONCE = "All impacts are solved together, as a complementarity problem: touching balls act as one block."
