@@ -114,9 +114,9 @@ def _tell(rows: Sequence[Row], times: results.Times, made: Path, controlled: boo
         if voice.as_json():
             voice.result(voice.plain_rows_as_json(rows))
             return None
+        show(rows, times)
         if controlled and not voice.quiet():
             show_controllers(made)
-        show(rows, times)
     except (OSError, OwnFault) as error:
         return error
     return None
