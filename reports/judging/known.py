@@ -32,7 +32,7 @@ KINDS = (
 )  # fmt: skip
 OF_FILES = ("judging.known_files",)
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
-OF_ENGINES = ("judging.known_engines", "judging.known_contacts")
+OF_ENGINES = ("judging.known_engines", "judging.known_contacts", "judging.known_flights")
 """Of an engine that runs, beside: others are not imported for it."""
 OF_COMMANDS = {
     "replay": ("replay.known_replay", "replay.known_fits", "replay.known_formats"), "bench": ("bench.known_bench",),
