@@ -35,7 +35,8 @@ OF_FILES = ("judging.known_files",)
 OF_ENGINES = ("judging.known_engines", "judging.known_contacts", "judging.known_flights")
 """Of an engine that runs, beside: others are not imported for it."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_formats"), "bench": ("bench.known_bench",),
+    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats"),
+    "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
     "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),
 }  # fmt: skip
