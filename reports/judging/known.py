@@ -34,10 +34,12 @@ OF_FILES = ("judging.known_files",)
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
 OF_SCENES = ("judging.known_scenes",)
 """Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""
-OF_ENGINES, OF_DRIVES = ("judging.known_engines", "judging.known_contacts"), ("judging.known_drives",)
+OF_ENGINES = ("judging.known_engines", "judging.known_contacts", "judging.known_flights")
+OF_DRIVES = ("judging.known_drives",)
 """Of an engine that runs, beside: others are not imported for it; and of its motors, likewise with those of scenes."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_formats"), "bench": ("bench.known_bench",),
+    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats"),
+    "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
     "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),
 }  # fmt: skip
