@@ -176,7 +176,8 @@ class ColumnMapError(CrossbodyError, ValueError):
 
     def __init__(self, path: str | os.PathLike[str], key: str, text: str) -> None:
         self.path, self.key = os.fspath(path), key
-        super().__init__(f"{repr(self.path)[1:-1]}: {repr(key)[1:-1]}: {text}")
+        where = "" if key == "$" else f"{repr(key)[1:-1]}: "
+        super().__init__(f"{repr(self.path)[1:-1]}: {where}{text}")
 
 
 class OutputError(CrossbodyError, OSError):
