@@ -55,6 +55,9 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
             f"At {many} instant{'s' * (many > 1)}, from {truth.trajectory.searched_until:.4g} s on, "
             "too many contacts could change to search for a second motion."
         )
+    if many := truth.trajectory.counts.get("touches_that_gained", 0):
+        gained = truth.trajectory.energy_gained
+        told.append(f"By its law {many} touch{'es' * (many > 1)} with friction gave out {gained:.3g} J more than taken in.")
     if other:
         told.append(f"At {other} samples its two sources have rows in other modes.")
     told += [f"The {name} of its second source is {off:.1e}, beyond {PARTED:g}." for name, off in beside.items()]
