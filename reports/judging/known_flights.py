@@ -22,7 +22,8 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.reports.judging.asked import Found, rows_of
 from crossbody.reports.judging.known_contacts import DEAR, EXACT, run_of
-from crossbody.reports.judging.known_engines import FIT, OTHERS
+from crossbody.reports.judging.known_drives import FIT
+from crossbody.reports.judging.known_engines import OTHERS
 
 MASS, A, C, G = 0.7, 0.02, 0.031, 9.81
 """Of a top: kg, kg m^2, and m/s^2."""

@@ -10,7 +10,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, EngineUnavailable, Inputs, Outcome
-from crossbody.reports.judging import known, known_engines
+from crossbody.reports.judging import known, known_drives, known_engines
 from crossbody.reports.judging.steps_taken import miscounted
 
 
