@@ -20,7 +20,7 @@ def test_engines_give_their_known_answers(name: str) -> None:
         engines.load(name)
     except EngineUnavailable as missing:
         pytest.skip(str(missing))
-    asked = known.kinds((*known.OF_ENGINES, *known.OF_DRIVES))
+    asked = known.kinds((*known.OF_ENGINES, *known.OF_CONTACTS, *known.OF_DRIVES))
     assert [module.wrong(name) for module in asked] == [()] * len(asked)
 
 
