@@ -11,8 +11,8 @@ from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.layout import Buffers, Model, Work
 from crossbody.reference.kinds import Bytes
 
-FLURRY = 256  # instants at which contacts switched, and one for every row,
-FLURRY_PART = 0.01  # within this part of the time of the fastest law: a chatter
+FLURRY = 4096  # instants at which contacts switched (two corners that take turns for some hundred part again),
+FLURRY_PART = 0.2  # within this part of the time of the fastest law: a chatter
 
 
 @compiled
@@ -76,7 +76,7 @@ def chatters(s: Any, m: Model, b: Buffers) -> bool:
     Modes that switch to and fro at once have no motion in the limit; the last line of the history marks their rows.
     """
     s.flurry += 1
-    if s.flurry < FLURRY + s.nc:
+    if s.flurry < FLURRY:
         return False
     span, fastest = s.t - s.flurry_t, 0.0
     s.flurry, s.flurry_t = 0, s.t
