@@ -59,6 +59,8 @@ _NOTES = {
     "touches_that_gained": "touches_that_gained: touches with friction ({touches_that_gained}) gave out more energy "
     "than they took in, {energy_gained:.3g} J in all. The law prescribes how a gap moves whatever friction does to the "
     "load (Kane's paradox); a larger a1 or a smaller mu dissipates more.",
+    "starts_inside": "starts_inside: contacts with friction ({starts_inside}) began below their surface and gave out "
+    "{energy_handed:.3g} J on their way out of it, which is in no energy at the start.",
 }
 _LOOPS_PRESS = (
     "indeterminate: loops hold a contact that may slide, so that its normal force and friction are "
@@ -325,7 +327,7 @@ class CompiledRun:
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
             told = _NOTES | ({"indeterminate": _LOOPS_PRESS} if self.state["loops_press"][0] else {})
-            state = {name: self.state[name][0] for name in (*told, "energy_gained")}
+            state = {name: self.state[name][0] for name in (*told, "energy_gained", "energy_handed")}
             return " ".join(text.format(**state) for name, text in told.items() if state[name])
         q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"

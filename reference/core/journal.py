@@ -11,8 +11,8 @@ from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.layout import Buffers, Model, Work
 from crossbody.reference.kinds import Bytes
 
-FLURRY = 256  # instants at which contacts switched, and one for every row,
-FLURRY_PART = 0.01  # within this part of the time of the fastest law: a chatter
+FLURRY = 2048  # instants at which contacts switched (corners that take turns for some hundred may come to a jam),
+FLURRY_PART = 0.1  # within this part of the time of the fastest law: a chatter
 
 
 @compiled
@@ -75,14 +75,13 @@ def chatters(s: Any, m: Model, b: Buffers) -> bool:
 
     Modes that switch to and fro at once have no motion in the limit; the last line of the history marks their rows.
     """
-    s.flurry += 1
-    if s.flurry < FLURRY + s.nc:
-        return False
-    span, fastest = s.t - s.flurry_t, 0.0
-    s.flurry, s.flurry_t = 0, s.t
+    fastest = 0.0
     for i in range(s.nc):
         fastest = max(fastest, np.sqrt(m.alpha[i, 0]), m.alpha[i, 1])
-    if span * fastest > FLURRY_PART:
+    if (s.t - s.flurry_t) * fastest > FLURRY_PART:
+        s.flurry, s.flurry_t = 0, s.t
+    s.flurry += 1
+    if s.flurry < FLURRY:
         return False
     marks = b.history[len(b.history) - 1]
     marks[:] = 0

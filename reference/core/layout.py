@@ -41,7 +41,8 @@ OF_FRICTION = (
     "borne", "even", "carried", "known", "off_by", "course", "island", "packed", "calm", "spot",
     "begin_at", "end_at",
     "calm_place", "calm_size", "isle_unknowns", "isle_normals", "isle_rank", "isle_second", "isle_held", "isle_grown",
-    "remains", "pivots", "taken", "root_weight", "asked", "touch_work", "touch_open", "deepest", "taken_in",
+    "remains", "pivots", "taken", "root_weight", "asked", "touch_work", "touch_given",
+    "touch_open", "deepest", "taken_in",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -203,6 +204,8 @@ STATE = np.dtype(
         ("energy_allowed", "f8"),  # by how much it may be open
         ("touches_that_gained", "i8"),  # touches with friction that gave out more energy than they took in,
         ("energy_gained", "f8"),  # J: and by how much in all
+        ("starts_inside", "i8"),  # touches with friction that began below the surface, which gave out
+        ("energy_handed", "f8"),  # J: from there
         # counters
         ("steps", "i8"),
         ("rejected", "i8"),
@@ -442,6 +445,7 @@ class Work:
     root_weight: Floats  # square roots of weights,
     asked: Floats  # and what sticking rows are asked for where they are shared
     touch_work: Floats  # (nc,) z of a contact where its touch began; inf where it does not touch
+    touch_given: Floats  # what its depth may hand out then,
     touch_open: Floats  # what steps had added by then,
     deepest: Floats  # the lowest gap since,
     taken_in: Floats  # and how much energy it had taken in by then

@@ -19,8 +19,9 @@ from crossbody.reference.kinds import Bytes
 
 @compiled
 def _begin(s: Any, w: Work, i: int, gap: float) -> None:
-    """Note what the account of row i is where it touches, with what a penetration there will hand out."""
-    w.touch_work[i] = w.z[i] + 0.5 * max(w.lam0[i], 0.0) * max(-gap, 0.0)
+    """Note what the account of row i is where it touches, with the most that a penetration there may hand out."""
+    w.touch_given[i] = max(w.lam0[i], 0.0) * max(-gap, 0.0)
+    w.touch_work[i] = w.z[i] + w.touch_given[i]
     w.touch_open[i] = s.energy_added
     w.deepest[i], w.taken_in[i] = 0.0, 0.0
 
@@ -34,9 +35,13 @@ def _end(s: Any, w: Work, i: int, gap: float) -> None:
     """
     gain = w.z[i] - w.touch_work[i]
     above = w.taken_in[i] * (gap / w.deepest[i]) ** 2 if gap > 0.0 and w.deepest[i] < 0.0 else 0.0
-    if gain > above + s.energy_added - w.touch_open[i]:
+    unknown, given = s.energy_added - w.touch_open[i], min(w.touch_given[i], gain + w.touch_given[i])
+    if gain > above + unknown:
         s.touches_that_gained += 1
         s.energy_gained += gain
+    if given > above + unknown:
+        s.starts_inside += 1
+        s.energy_handed += given
     w.touch_work[i] = np.inf
 
 

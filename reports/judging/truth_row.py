@@ -57,9 +57,7 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
         )
     if many := truth.trajectory.counts.get("touches_that_gained", 0):
         gained = truth.trajectory.energy_gained
-        told.append(
-            f"By its law {many} touch{'es' * (many > 1)} with friction gave out {gained:.3g} J more than taken in."
-        )
+        told.append(f"Touches with friction that gave out more than they took in: {many}, by {gained:.3g} J in all.")
     if other:
         told.append(f"At {other} samples its two sources have rows in other modes.")
     told += [f"The {name} of its second source is {off:.1e}, beyond {PARTED:g}." for name, off in beside.items()]

@@ -169,3 +169,19 @@ def test_a_bounce_with_friction_is_that_of_its_law_and_says_what_it_gains(seed: 
 @pytest.mark.parametrize("seed", SLOW)
 def test_forty_bounces_with_friction_are_those_of_their_laws(seed: int) -> None:
     _is_of_the_law(seed)
+
+
+def test_a_start_below_the_surface_says_what_it_gives_out() -> None:
+    """The law pushes a ball from a depth d to a height g/a0, which is no gain of friction's."""
+    mass, depth, a0 = 2.0, 0.02, 1e4
+    ball = Bounce(
+        np.full(3, 0.1), mass, np.full(3, 0.4 * mass * 0.01), a0, 1e-3, 0.5,
+        np.array([0.0, 0.0, 0.1 - depth, 1.0, *np.zeros(9)]),
+    )  # fmt: skip
+    run = ball.run(0.05)
+    given = float(run.total_energy[-1] - run.total_energy[0])
+    assert run.counts["starts_inside"] == 1
+    assert "touches_that_gained" not in run.counts
+    assert given == pytest.approx(0.5 * mass * a0 * (depth + G / a0) ** 2, rel=1e-3)
+    told = float(run.message.split(" J on their way")[0].split()[-1])
+    assert told == pytest.approx(given, rel=0.01)

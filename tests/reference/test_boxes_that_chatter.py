@@ -41,7 +41,9 @@ def drawn(seed: int) -> Trajectory:
 def ends_soon(seed: int) -> Trajectory:
     began = time.process_time()
     run = drawn(seed)
-    assert time.process_time() - began <= MOST, (seed, run.outcome, run.t[-1])
+    took = time.process_time() - began
+    assert run.outcome in (Outcome.FINISHED, Outcome.PAINLEVE, Outcome.MODE_CYCLE), (seed, run.message)
+    assert took <= MOST or run.outcome is Outcome.MODE_CYCLE, (seed, took)
     return run
 
 
@@ -50,7 +52,7 @@ def test_a_chatter_ends_with_its_place_and_time(seed: int) -> None:
     run = ends_soon(seed)
     assert run.outcome is Outcome.MODE_CYCLE
     assert "Rows [" in run.message
-    assert f"t = {run.t[-1]:.6g}"[:8] in run.message
+    assert f"t = {run.t[-1]:.6f}"[:9] in run.message
 
 
 @pytest.mark.slow
