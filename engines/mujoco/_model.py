@@ -104,7 +104,7 @@ def settings(case: Case, profile: str) -> dict[str, Parameter]:
 
 
 def _rubs(model: Any) -> bool:
-    """Whether shapes of a file may touch with friction, which MuJoCo computes whether or not the scene has rows for it."""
+    """Whether shapes of a file may touch with friction: MuJoCo computes it also where the scene has no rows for it."""
     touching = (model.geom_contype | model.geom_conaffinity) != 0
     return bool((model.geom_condim[touching] > 1).any() or (model.pair_dim > 1).any())
 
