@@ -176,7 +176,8 @@ class ColumnMapError(CrossbodyError, ValueError):
 
     def __init__(self, path: str | os.PathLike[str], key: str, text: str) -> None:
         self.path, self.key = os.fspath(path), key
-        super().__init__(f"{repr(self.path)[1:-1]}: {repr(key)[1:-1]}: {text}")
+        where = "" if key == "$" else f"{repr(key)[1:-1]}: "
+        super().__init__(f"{repr(self.path)[1:-1]}: {where}{text}")
 
 
 class OutputError(CrossbodyError, OSError):
@@ -224,7 +225,8 @@ _ADVICE = {
     Outcome.NOT_FINITE: "A kernel or controller returned NaN or infinity: examine the state named with this outcome.",
     Outcome.ILL_POSED: "The active rows or the mass matrix lost rank: the multipliers are not unique here.",
     Outcome.MODE_CYCLE: (
-        "The contacts named with this outcome switch forever at one instant: their laws contradict each other."
+        "The contacts named with this outcome switch forever, at one instant or within no time: their laws contradict "
+        "each other."
     ),
     Outcome.LOST: "The motion left the region in which its controller holds: start closer, or change the controller.",
     Outcome.INCONSISTENT: "The results contradict the model in the quantity named with this outcome.",

@@ -509,6 +509,7 @@ class Scene:
         for pair in self.pairs:
             _known(pair, "first", pair.first, shapes)
             _known(pair, "second", pair.second, shapes)
+        _paired_once(self.pairs)
         for loop in self.loops:
             among = bodies if loop.in_space else {"", *(tendons if loop.type == "tendon" else joints)}
             _known(loop, "first", loop.first, among - {""})
@@ -598,6 +599,18 @@ def _unique(group: str, parts: Sequence[_Named]) -> None:
         if part.name in seen:
             raise SceneError(f"Scene.{group} has the name {part.name!r} twice.")
         seen.add(part.name)
+
+
+def _paired_once(pairs: Sequence[Pair]) -> None:
+    seen: dict[frozenset[str], str] = {}
+    for pair in pairs:
+        shapes = frozenset((pair.first, pair.second))
+        if shapes in seen:
+            raise SceneError(
+                f"Pairs {seen[shapes]!r} and {pair.name!r} are of the same shapes, {pair.first!r} and {pair.second!r}: "
+                "each would press with its own law. Valid is one pair for any two shapes."
+            )
+        seen[shapes] = pair.name
 
 
 def _known(part: _Named, field: str, name: str, among: Any) -> None:

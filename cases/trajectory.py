@@ -125,6 +125,8 @@ class Trajectory:
         searched_until: until when no other motion can keep the law, or was searched for, s; finite
             where too many contacts could change at one instant to try all their sets
             (`not_searched`): what follows may be one motion of several.
+        energy_gained: what touches with friction gave out beyond what they had taken in, J
+            (`touches_that_gained`); only `compiled` with a ledger tells.
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 
@@ -148,6 +150,7 @@ class Trajectory:
     determined_until: float = math.inf
     unique_until: float = math.inf
     searched_until: float = math.inf
+    energy_gained: float = 0.0
     sol: Callable[..., tuple[Floats, Floats]] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:

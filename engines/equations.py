@@ -74,12 +74,12 @@ def _built(build: Callable[..., System], parameters: Any, law: Any) -> System:
     return made
 
 
-def system_of(case: Case) -> System:
-    """The mechanism with the law of its rows; its findings name shapes of a file that have none.
+def system_of(case: Case, made: System | None = None) -> System:
+    """The mechanism with the law of its rows, as it was made if given; its findings name shapes of a file without any.
 
     `covered` of the harness asks that of a motion; whoever takes the equations alone is told by every run of them.
     """
-    made, lost = equations_of(case), rowless(case.scene) if case.file and case.scene is not None else {}
+    made, lost = made or equations_of(case), rowless(case.scene) if case.file and case.scene is not None else {}
     return replace(made, findings=(*made.findings, _left_out(lost))) if lost else made
 
 

@@ -56,6 +56,9 @@ _NOTES = {
     "the one that was reached first was used.",
     "unmet": "sticks_contradict: contacts that stuck at an instant excluded each other, and no set of modes was found "
     "that all of them meet; they were met in the least squares.",
+    "touches_that_gained": "touches_that_gained: touches with friction ({touches_that_gained}) gave out more energy "
+    "than they took in, {energy_gained:.3g} J in all. The law prescribes how a gap moves whatever friction does to the "
+    "load (Kane's paradox); a larger a1 or a smaller mu dissipates more.",
 }
 _LOOPS_PRESS = (
     "indeterminate: loops hold a contact that may slide, so that its normal force and friction are "
@@ -286,6 +289,7 @@ class CompiledRun:
             else None,
             determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
             unique_until=float(state["unique_until"]) if state["not_unique"] or state["unmet"] else np.inf,
+            energy_gained=float(state["energy_gained"]),
             searched_until=float(state["searched_until"]) if state["not_searched"] else np.inf,
         )  # fmt: skip
         if self.callback is not None:
@@ -321,7 +325,8 @@ class CompiledRun:
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
             told = _NOTES | ({"indeterminate": _LOOPS_PRESS} if self.state["loops_press"][0] else {})
-            return " ".join(text for name, text in told.items() if self.state[name][0])
+            state = {name: self.state[name][0] for name in (*told, "energy_gained")}
+            return " ".join(text.format(**state) for name, text in told.items() if state[name])
         q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
         return f"{self._cause(outcome, q, v)}{where}. {outcome.advice}"

@@ -63,9 +63,10 @@ def cli() -> None:
 )  # fmt: skip
 @click.option("--json", "plain", is_flag=True, help="Print names and summaries as JSON.")
 def list_(name: str | None, plain: bool) -> None:
-    """List all names, or the details of a case, robot file, engine or model of logs.
+    """List all names, or the details of one.
 
-    Names are those of cases, engines, metrics, stress suites, models and column maps of logs.
+    One is a case, a robot file, an engine or a model of logs; all names are those of cases, engines, metrics, stress
+    suites, models and column maps of logs.
     """
     from crossbody.reports import described
 
@@ -294,10 +295,11 @@ def picture(folder: Path, out: Path, case: str, engine: str, instant: float | No
     """
     from crossbody.reports.commands.shared import check_answers
     from crossbody.reports.pages import picture as drawing
-
-    check_answers("picture")
     from crossbody.reports.pages.results import motion
+    from crossbody.reports.runs.output import require_ours
 
+    require_ours(folder, "run")  # what is wrong is told before anything is asked
+    check_answers("picture")
     trace = motion(folder, case, engine)
     drawing.write(drawing.Film(trace), out, instant, fps, speed)
     if as_json():

@@ -19,13 +19,13 @@ from typing import Any
 
 import click
 import pytest
+from places import FOLDERS
 
 from crossbody.reference import code_store
 from crossbody.reports.cli import cli, main
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(str(path.relative_to(DOCS)) for path in DOCS.rglob("*.md"))
-FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 COMMENT = re.compile(r"#\s*exit code (\d)(?:: (.*))?$")
 

@@ -14,9 +14,8 @@ from typing import Any
 
 import pytest
 import setuptools
+from places import FOLDERS, ROOT
 
-ROOT = Path(__file__).parent.parent
-FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 TOLD: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
 FILES = [p for name in FOLDERS for p in (ROOT / name).rglob("*") if p.is_file() and p.parent.name != "__pycache__"]
 

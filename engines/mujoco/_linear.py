@@ -74,7 +74,8 @@ def linearise(case: Case, spot: Spot) -> tuple[Tangent, ...]:
         Tangent(
             way="mjd_transitionFD, one-sided, logarithm", slope=plain,
             explained=_logarithm(_step(exact, dt), dt),
-            known=f"The logarithm of Euler's step over dt = {dt:.2g} s is off by O(dt).",
+            known=f"The logarithm of one step of semi-implicit Euler over its length, here {dt:.2g} s of the profile "
+            "matched and not the file's, is off by its length.",
         ),
     )  # fmt: skip
 

@@ -133,7 +133,7 @@ def load_columns(source: str | Path) -> Columns:
         source: a TOML file, or the name of one of `maps()`.
 
     Raises:
-        ColumnMapError: with the path of the key, for what is no TOML, an unknown key, a wrong
+        ColumnMapError: with the path of the key, for what is not TOML, an unknown key, a wrong
             type, a number that is not finite or a unit that does not exist.
     """
     path = Path(arguments.path("columns", source))
@@ -162,7 +162,7 @@ def parse_columns(text: bytes | str, path: str | Path = "column map") -> Columns
     try:
         found = msgspec.toml.decode(text)
     except (msgspec.DecodeError, ValueError, RecursionError) as error:  # a number of 5,000 digits is a ValueError
-        raise ColumnMapError(path, "$", f"is no TOML: {str(error)[:LONGEST]}.") from None
+        raise ColumnMapError(path, "$", f"is not TOML: {str(error)[:LONGEST]}.") from None
     _check_numbers(found, "$", path)
     _signals_one_by_one(found, path)
     columns: Columns = _convert(found, Columns, "$", path)

@@ -22,6 +22,7 @@ from crossbody.reference.core import (
     record,
     settle,
     stepping,
+    touches,
 )
 from crossbody.reference.core.acceleration import scatter
 from crossbody.reference.core.algebra import ULP, all_finite, copy
@@ -173,14 +174,24 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         return PAINLEVE
     if jam and code == 0:
         _leave_open(s)
+    if s.frictional and code == 0 and journal.chatters(s, m, b):
+        return MODE_CYCLE
     if s.near_jam and code == 0:
         note_first(s, True)
         s.not_unique += 1
     if code == 0 and s.audited:
-        code = audit.account(K, s, m, w)
+        code = _audit(K, s, m, w, b)
     if code == 0:
         record.here(K, s, m, w, b.mode, b.out, b.modes, s.audited)
     return int(code)
+
+
+@compiled
+def _audit(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Close the energy account of all, and that of touches with friction."""
+    if s.frictional:
+        touches.follow(s, m, w, b.mode)
+    return int(audit.account(K, s, m, w))
 
 
 @compiled
@@ -279,7 +290,7 @@ def _arrive(K: Any, s: Any, m: Model, w: Work, b: Buffers, t: float, at_stop: bo
     if s.frictional and (ask(RENEW, s, m, w, NOTHING) > 0.0 or s.parting) and not at_stop:
         s.theta = 1.0
         return _switch(K, s, m, w, b)
-    code = audit.account(K, s, m, w) if s.audited else 0
+    code = _audit(K, s, m, w, b) if s.audited else 0
     if code != 0:
         return int(code)
     record.step_end(K, s, m, w, b.mode, b.out, b.modes)
@@ -325,9 +336,12 @@ def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         _take_inputs(K, s, m, w, b)
         if s.audited:
             audit.begin_account(K, s, m, w)
+            w.touch_work[:] = np.inf
     code = _restart(K, s, m, w, b)
     if code != 0:
         return code
+    if s.audited and s.frictional:
+        touches.follow(s, m, w, b.mode)
     K.energy(w.y[: s.nq], w.y[s.nq :], m.p, w.e)
     record.here(K, s, m, w, b.mode, b.out, b.modes, True)
     while s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import ULP, copy
 from crossbody.reference.core.layout import Buffers, Model, Work
 from crossbody.reference.kinds import Bytes
+
+FLURRY = 256  # instants at which contacts switched, and one for every row,
+FLURRY_PART = 0.01  # within this part of the time of the fastest law: a chatter
 
 
 @compiled
@@ -61,6 +66,28 @@ def remember(s: Any, b: Buffers) -> bool:
         copy(b.mode, b.history[s.history])
         s.history += 1
         return False
+    return True
+
+
+@compiled
+def chatters(s: Any, m: Model, b: Buffers) -> bool:
+    """Count an instant at which contacts switched; whether many have come far faster than any law moves a gap.
+
+    Modes that switch to and fro at once have no motion in the limit; the last line of the history marks their rows.
+    """
+    s.flurry += 1
+    if s.flurry < FLURRY + s.nc:
+        return False
+    span, fastest = s.t - s.flurry_t, 0.0
+    s.flurry, s.flurry_t = 0, s.t
+    for i in range(s.nc):
+        fastest = max(fastest, np.sqrt(m.alpha[i, 0]), m.alpha[i, 1])
+    if span * fastest > FLURRY_PART:
+        return False
+    marks = b.history[len(b.history) - 1]
+    marks[:] = 0
+    for e in range(max(0, s.events - FLURRY), s.events):
+        marks[b.events[e, 0]] = 1
     return True
 
 

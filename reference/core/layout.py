@@ -41,7 +41,7 @@ OF_FRICTION = (
     "borne", "even", "carried", "known", "off_by", "course", "island", "packed", "calm", "spot",
     "begin_at", "end_at",
     "calm_place", "calm_size", "isle_unknowns", "isle_normals", "isle_rank", "isle_second", "isle_held", "isle_grown",
-    "remains", "pivots", "taken", "root_weight", "asked",
+    "remains", "pivots", "taken", "root_weight", "asked", "touch_work", "touch_open", "deepest", "taken_in",
 )  # fmt: skip
 NEVER = 2.0  # an event's place in units of the step, when there is none
 
@@ -117,6 +117,8 @@ STATE = np.dtype(
         ("cautious", "i8"),  # accepted steps until the last one that was rejected is forgotten
         ("hold", "i8"),
         ("standing", "i8"),  # switches since time last went on
+        ("flurry", "i8"),  # instants at which contacts switched,
+        ("flurry_t", "f8"),  # since this one
         ("promised", "f8"),  # an implicit step, by the last explicit one
         ("trial_steps", "i8"),
         ("trial_rhs", "i8"),
@@ -199,6 +201,8 @@ STATE = np.dtype(
         ("energy_open", "f8"),  # what the account misses
         ("energy_added", "f8"),  # what all steps may have added
         ("energy_allowed", "f8"),  # by how much it may be open
+        ("touches_that_gained", "i8"),  # touches with friction that gave out more energy than they took in,
+        ("energy_gained", "f8"),  # J: and by how much in all
         # counters
         ("steps", "i8"),
         ("rejected", "i8"),
@@ -437,6 +441,10 @@ class Work:
     small: Floats2  # and factors of L^T L
     root_weight: Floats  # square roots of weights,
     asked: Floats  # and what sticking rows are asked for where they are shared
+    touch_work: Floats  # (nc,) z of a contact where its touch began; inf where it does not touch
+    touch_open: Floats  # what steps had added by then,
+    deepest: Floats  # the lowest gap since,
+    taken_in: Floats  # and how much energy it had taken in by then
 
 
 MODEL, BUFFERS, WORK = bundle_type(Model), bundle_type(Buffers), bundle_type(Work)

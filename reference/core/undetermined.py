@@ -23,7 +23,7 @@ from crossbody.reference.core.layout import Model, Work
 from crossbody.reference.core.loops import complete
 from crossbody.reference.core.unknowns import fill
 
-MOVES = 1e-8  # part of the terms of a change of v', squared, above which it is none of rounding
+MOVES = 1e-9  # part of the terms of a change of v' above which it is none of rounding
 MOST = 1e3  # times the largest load: what contacts that press on each other may carry has no bound of its own
 
 
@@ -48,13 +48,17 @@ def _change_nothing(s: Any, m: Model, w: Work, rank: int, k: int) -> None:
 
 
 @compiled
-def _move(s: Any, w: Work) -> bool:
+def _move(s: Any, m: Model, w: Work) -> bool:
     """Whether the multipliers in w.trial move anything; those of contacts that stick together never do."""
     moved, size = 0.0, 0.0
-    for j in range(s.na):
-        size += w.trial[j] * w.trial[j] * w.gram[j, j]
-        for c in range(s.na):
-            moved += w.trial[j] * w.gram[j, c] * w.trial[c]
+    for c in range(s.n):
+        change, terms = 0.0, 0.0
+        for j in range(s.na):
+            i = w.idx[j]
+            if m.span[i, 0] <= c < m.span[i, 1]:
+                change += w.X[j, c] * w.trial[j]
+                terms += abs(w.X[j, c] * w.trial[j])
+        moved, size = max(moved, abs(change)), max(size, terms)
     return bool(moved > MOVES * size)
 
 
@@ -124,7 +128,7 @@ def _take_shares(s: Any, m: Model, w: Work) -> None:
         rank = factor_complete(w.matrix, s.unknowns, s.unknowns, w.down, w.across, s.unknowns)
         for k in range(rank, s.unknowns):
             _change_nothing(s, m, w, rank, k)
-            if _move(s, w):
+            if _move(s, m, w):
                 if s.loops:
                     complete(s, m, w, w.r, w.trial, False)
                 _add(s, m, w, w.trial, _range(s, m, w), w.open_rate)

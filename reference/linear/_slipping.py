@@ -117,10 +117,10 @@ class Slipping:
         return int(self.system.tangent[i]) + np.arange(int(self.system.tangents[i]))
 
     def _way(self, i: int, k: int) -> Floats:
-        """Direction in which contact i slides at a sample: against its friction."""
+        """Direction in which contact i slides at a sample: against its friction; NaN where that has none."""
         force = self.run.lam[k, self._rows(i)]
-        way: Floats = -force / np.linalg.norm(force)
-        return way
+        size = float(np.linalg.norm(force))
+        return np.asarray(-force / size if size > 0.0 else np.full(len(force), np.nan))
 
     def turns(self, here: Point) -> tuple[list[Any], bool]:
         """Where slips in space come to have a direction, lose it, or turn slowly at last; and whether one turns fast.

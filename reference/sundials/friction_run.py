@@ -210,6 +210,14 @@ class FrictionRun(SundialsRun):
     def _arc_on(self, arc: Any, view: View) -> Any:
         return self._arc(view) if arc.stiff else arc
 
+    def _check_progress(self, moved: bool) -> None:
+        """Say where time does not go on because contacts jam that it is that."""
+        try:
+            super()._check_progress(moved)
+        except Ended as end:
+            jamming = self.friction.jamming(self.state.t, self.state.q, self.state.v)
+            raise Ended(Outcome.PAINLEVE, jamming) if jamming else end from None
+
     def _accelerate(self, t: float, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         return self.friction.accelerate(t, q, v)
 

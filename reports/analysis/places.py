@@ -19,6 +19,7 @@ from crossbody.cases import Case, Mode, Outcome, SceneError, Trajectory, Unknown
 from crossbody.cases.arrays import Floats
 from crossbody.engines.equations import system_of
 from crossbody.engines.linear import Spot
+from crossbody.engines.reference import ReferenceRun
 from crossbody.reference import System, delta
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.loop import closed_loop
@@ -94,7 +95,7 @@ def _known(case: Case, at: Mapping[str, float]) -> Mapping[str, float]:
 def _place(
     case: Case, name: str, active: Sequence[int], *, held: bool = True, q: ArrayLike | None = None,
     v: ArrayLike | None = None, t: float = 0.0, free: Sequence[int] | None = None, rates: Sequence[int] = (),
-    inputs: Sequence[int] = (), system: System | None = None,
+    inputs: Sequence[int] = (), system: System | None = None, powered: bool = True,
 ) -> Place:  # fmt: skip
     made = build(case) if system is None else system
     u = case.inputs.at(t) if case.scene is not None and case.inputs is not None else None
@@ -104,7 +105,7 @@ def _place(
         names = [coordinate.name for coordinate in case.velocities]
         model = linearise(made, found.q, found.v, found.u, active, names=names, reduce=held, t=t)
     return Place(
-        name=name, case=case, system=made, trim=found, model=model, t=t, held=held, powered=system is None
+        name=name, case=case, system=made, trim=found, model=model, t=t, held=held, powered=powered
     )  # fmt: skip
 
 
@@ -118,7 +119,7 @@ def _delta(case: Case, at: Mapping[str, float]) -> list[Place]:
     z = delta.flange(robot, q)
     system = delta.system(robot, p=float(case.number("p")))
     name = f"flange at ({z[0]:.4g}, {z[1]:.4g}, {z[2]:.4g}) m"
-    found = [_place(case, name, range(6), q=q, free=[], inputs=[0, 1, 2], system=system)]
+    found = [_place(case, name, range(6), q=q, free=[], inputs=[0, 1, 2], system=system, powered=False)]
     if "ramp" in case.parameters and not at:
         y = np.full(3, delta.elbow_angle(robot) + case.number("offset"))
         guess = delta.holding_pose(robot, float(y[0]))
@@ -204,7 +205,8 @@ def _visited(case: Case, at: Mapping[str, float]) -> list[Place]:
     """In every set of rows that are on: where a run moves least, or most where some slide."""
     from crossbody import engines
 
-    run, system = engines.load("reference").prepare(case, "compiled").run(), build(case)
+    prepared = engines.load("reference").prepare(case, "compiled")
+    run, system = prepared.run(), system_of(case, prepared.system if isinstance(prepared, ReferenceRun) else None)
     follows, drift = np.asarray(system.follows), np.asarray(system.drift)
     sets: dict[tuple[tuple[int, bool], ...], tuple[float, int]] = {}
     for k, (v, modes) in enumerate(zip(run.v, run.mode, strict=True)):
@@ -233,7 +235,7 @@ def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int
     )
     try:
         if not sliding and system.activations is None:
-            return _place(case, name, list(rows), held=not one_way, q=run.q[k], t=t)
+            return _place(case, name, list(rows), held=not one_way, q=run.q[k], t=t, system=system)
         model = linearise(
             system, run.q[k], run.v[k], u, list(rows), sliding=sliding, t=t,
             activations=_activations(case, system, t),

@@ -15,6 +15,7 @@ from crossbody.cases.files.case import rubbing
 from crossbody.reports import layout, voice
 from crossbody.reports.analysis import bode as curves
 from crossbody.reports.analysis import numbers as work
+from crossbody.reports.analysis import summary as told
 from crossbody.reports.analysis.counterparts import counterparts
 from crossbody.reports.analysis.loci import Family, limits, root_locus
 from crossbody.reports.analysis.places import places
@@ -78,6 +79,7 @@ def analyse(
         voice.note(text)
     engines, engine_poles = counterparts(found)
     tables = {
+        "summary": told.summary(found, case),
         "equilibria": work.equilibria(found, case), "poles": work.poles(found), "ranks": work.ranks(found),
         "engines": engines, "engine-poles": engine_poles,
     }  # fmt: skip
@@ -96,6 +98,7 @@ def analyse(
         output.check(out, "analyse")
         publish(out, "analyse", {f"{PREFIX}{key}": rows for key, rows in tables.items()}, provenance(command))
     if not voice.told_as_json(tables) and not voice.quiet():
+        click.echo(layout.told(told.sentence(case.label, tables["summary"], len(found))) + "\n")
         _show(case.label, tables)
         if out is not None:
             where(out)
@@ -132,8 +135,8 @@ def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
         click.echo(layout.told(f"{place}: {why}"))
     engines = tables["engines"]
     ways = [f"{who}: {way}" if isinstance(way, str) else who for who, way in engines[["engine", "way"]].to_numpy()]
-    told = engines.assign(way=ways)[BESIDE].head(SHOWN)
-    print_rows(told, 2, f"{label}: differences of engines\n", above="place")
+    beside = engines.assign(way=ways)[BESIDE].head(SHOWN)
+    print_rows(beside, 2, f"{label}: differences of engines\n", above="place")
     for why in engines["why"].dropna().unique():
         if why:
             who = ", ".join(engines.loc[engines["why"] == why, "engine"].unique())

@@ -238,11 +238,11 @@ def parameters(command: _Work) -> _Work:
             help="Robot file: a force, N, at a body's centre of mass from T0 to T1, s; repeatable.",
         ),
         click.option(
-            "--start", type=(str, float), multiple=True, metavar="NAME VALUE",
+            "--start", type=(str, NUMBER), multiple=True, metavar="NAME VALUE",
             help="Robot file: a coordinate at the start, m or rad, by its joint's name; repeatable.",
         ),
         click.option(
-            "--rate", type=(str, float), multiple=True, metavar="NAME VALUE",
+            "--rate", type=(str, NUMBER), multiple=True, metavar="NAME VALUE",
             help="Robot file: a velocity at the start, m/s or rad/s; repeatable.",
         ),
         click.option("--without", metavar="PARTS", help="Robot file: parts to leave out in every engine."),

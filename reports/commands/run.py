@@ -20,6 +20,7 @@ from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging import known
 from crossbody.reports.judging.audit import SEED
 from crossbody.reports.judging.reach import BUDGET
+from crossbody.reports.judging.truth_row import start_below
 from crossbody.reports.judging.verdict import Row, Word, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results
@@ -61,6 +62,8 @@ def run(
                 again = repeated.repeat(cases[i], sources[i], pairs, rtol, budget, result.case.t_end)
                 rows = study.write_case(made, result, again)
                 repeated.check(rows, cases[i], result, rtol, asked, budget)
+            if below := start_below(result.case, result.truth):
+                voice.note(f"{cases[i].label}: {below}")
             if len(cases) > 1:
                 voice.note(f"{cases[i].label}: {counted(rows)}")
             return 0
@@ -114,9 +117,9 @@ def _tell(rows: Sequence[Row], times: results.Times, made: Path, controlled: boo
         if voice.as_json():
             voice.result(voice.plain_rows_as_json(rows))
             return None
+        show(rows, times)
         if controlled and not voice.quiet():
             show_controllers(made)
-        show(rows, times)
     except (OSError, OwnFault) as error:
         return error
     return None

@@ -53,7 +53,7 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
             or name in near.untold
         )
 
-    answers = known.wrong(file=bool(case.file), scene=not _plain(case), ran=ran)
+    answers = known.wrong(file=bool(case.file), scene=not plain(case), ran=ran)
     for name, value, (least, most), fault in (*unseen(case, truth, outside), *unheard(case), *_unruled(case), *answers):
         if least <= value <= most:
             why = f"A control passes: {fault} is no number outside."
@@ -65,7 +65,7 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
         yield of_truth(case, f"{name} (control)", f"A control passes: {fault}.", command, verdict=word)
 
 
-def _plain(case: Case) -> bool:
+def plain(case: Case) -> bool:
     """Whether a case has equations of its own, without friction, and nothing drives it."""
     driven = (case.control, case.inputs, case.force, case.gates, case.form)
     return case.scene is not None and not case.general and all(one is None for one in driven)

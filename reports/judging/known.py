@@ -28,16 +28,19 @@ KINDS = (
     "judging.known_answers", "judging.known_sides", "judging.known_touches", "judging.known_sources",
     "judging.known_growth", "judging.known_parts", "judging.known_steps", "judging.known_tables",
     "judging.known_equations", "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
-    "judging.known_verdicts", "judging.known_audits",
+    "judging.known_verdicts", "judging.known_audits", "judging.known_arithmetic", "judging.known_samples",
 )  # fmt: skip
 OF_FILES = ("judging.known_files",)
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
 OF_SCENES = ("judging.known_scenes",)
 """Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""
-OF_ENGINES, OF_DRIVES = ("judging.known_engines", "judging.known_contacts"), ("judging.known_drives",)
+OF_ENGINES, OF_DRIVES = ("judging.known_engines",), ("judging.known_drives",)
 """Of an engine that runs, beside: others are not imported for it; and of its motors, likewise with those of scenes."""
+OF_CONTACTS, COMPILES = ("judging.known_contacts", "judging.known_flights"), "reference"
+"""Of an engine's contacts and of bodies in flight; and the engine that compiles for them what a ball does not use."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_formats"), "bench": ("bench.known_bench",),
+    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats"),
+    "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
     "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),
 }  # fmt: skip
@@ -65,6 +68,8 @@ def wrong(*, file: bool = False, scene: bool = False, ran: Iterable[str] = ()) -
         yield from _once(f"{RUNS}_scenes", OF_SCENES)
     for name in sorted(set(ran) & set(engines.REGISTRY.own())):
         yield from _once(f"{RUNS}_{name}", OF_ENGINES, name)
+        if scene or name != COMPILES:
+            yield from _once(f"{RUNS}_contacts_{name}", OF_CONTACTS, name)
         if scene:
             yield from _once(f"{RUNS}_drives_{name}", OF_DRIVES, name)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
-from crossbody.cases import Event, Mode, Tier, Trajectory
+from crossbody.cases import Event, Mode, Switch, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.made_up import case_of
@@ -19,6 +20,8 @@ LATE, HAIR, COARSE, FINE = 1e-3, 1e-13, 0.05, 1e-3
 """By how much a release comes late, and a hand-over is off, s, and steps of a run and of its truth."""
 LEFT, DEEP, SAME = 0.3, 0.4, 1e-6
 """Force that a row lets go of, of 1 N, its gap there, of ways of 1 m, and part by which an answer may differ."""
+SWITCHES = "lets go as something switches"
+"""What a row does whose force may jump through zero."""
 Found = tuple[str, float, Range, str]
 
 
@@ -27,7 +30,7 @@ def wrong() -> tuple[Found, ...]:
     """Return metric, number, least and most, and motion, of what is another number than it must be."""
     return tuple(
         (name, found, (wanted, wanted), said)
-        for name, found, wanted, said in (*_sides(), *_impulses(), *_hand_overs())
+        for name, found, wanted, said in (*_sides(), *_impulses(), *_hand_overs(), *_choices())
         if not abs(found - wanted) <= SAME * max(wanted, SAME)
     )  # fmt: skip
 
@@ -64,22 +67,23 @@ def _sides() -> Iterator[tuple[str, float, float, str]]:
     events = tuple(
         Event(t=x, contact=0, before=Mode(a), after=Mode(b)) for x, a, b in zip(at, modes[:-1], modes[1:], strict=True)
     )
+    switch = Switch(t=at[1], variable=0, before=0, after=1)
     gaps = {"touches": (0, 2), "comes up to it": (2, 6)}
-    for said, (_, k) in (("nothing", (0, 0)), *gaps.items(), ("lets go", (1, 4))):
+    for said, (_, k) in (("nothing", (0, 0)), *gaps.items(), ("lets go", (1, 4)), (SWITCHES, (1, 4))):
         gap = np.array([1.0, 0.5, 0.0, 0.0, -DEEP, -DEEP, 0.0, 0.0, 0.5, 1.0])
         gap[k] = gap[k] - DEEP * np.sign(gap[k] or 1.0) if said in gaps else gap[k]
-        lam = np.array([0.0, 0.0, 0.0, 1.0, LEFT if said == "lets go" else 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-        column = gap[:, None]
+        lam = np.array([0.0, 0.0, 0.0, 1.0, LEFT if said in ("lets go", SWITCHES) else 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        column, switches = gap[:, None], (switch,) if said == SWITCHES else ()
         run = Trajectory(
             t=t, q=column, v=column, gap=column, lam=lam[:, None], energy=np.hstack([column, column]),
-            mode=modes[of][:, None], events=events,
+            mode=modes[of][:, None], events=events, switches=switches,
         )  # fmt: skip
         yield "event_gap", _measured("event_gap", run, run, case), _way(said, gap, lam, k), f"a row that {said}"
 
 
 def _way(said: str, gap: np.ndarray, lam: np.ndarray, k: int) -> float:
     ways = [abs(float(signal[k])) / float(np.max(np.abs(np.diff(signal)))) for signal in (gap, lam)]
-    return 0.0 if said == "nothing" else min(ways) if said == "lets go" else ways[0]
+    return 0.0 if said in ("nothing", SWITCHES) else min(ways) if said == "lets go" else ways[0]
 
 
 def _impulses() -> Iterator[tuple[str, float, float, str]]:
@@ -110,6 +114,14 @@ def _hand_overs() -> Iterator[tuple[str, float, float, str]]:
     for off in (-HAIR, HAIR):
         found = _measured("lam_impulse", handed(at, FINE), handed(at + off, COARSE), case)
         yield "lam_impulse", found, 0.0, "a force that jumps"
+
+
+def _choices() -> Iterator[tuple[str, float, float, str]]:
+    """Ask for the impulse of rows that depend on each other, of which another run may choose others: there is none."""
+    case, exact = case_of(("m",), (True,), 1), pressed(0.6, FINE)
+    dependent = replace(exact, counts={"redundant": 1})
+    found = metrics.load("lam_impulse_path").measure(from_run(dependent, Tier.A, "made up"), pressed(0.7, FINE), case)
+    yield "lam_impulse_path", 0.0 if found is None else np.nan, 0.0, "rows that depend on each other"
 
 
 def _measured(name: str, exact: Trajectory, run: Trajectory, case: object) -> float:

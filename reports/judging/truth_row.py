@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from crossbody.cases import Case
+from crossbody.cases.scene_contacts import turning
 from crossbody.reports.judging.stored import SAME_END, compared_until
 from crossbody.reports.judging.truth import PARTED
 from crossbody.reports.judging.verdict import Regression, Verdict, Word
@@ -13,6 +16,24 @@ from crossbody.reports.measuring.truth import TRUTH, Truth, shortened
 
 BESIDE_MOTION = ("energy_integrator", "contact_work", "lam_impulse_path")
 """Of a second source, what it records beside its motion: that this is right its motion does not tell."""
+
+
+STARTED = 1e-9
+"""Depth over the size of the coordinates, or 1, beyond which a contact of a start is deeper than rounding."""
+NAMED = 3  # contacts that are named
+
+
+def start_below(case: Case, truth: Truth) -> str:
+    """Say which contacts and bounds of a scene are beyond their surface at the start; nothing if none is."""
+    if case.scene is None or not len(truth.trajectory.t):
+        return ""
+    gap = np.where(case.law.touches, truth.trajectory.gap[0], 0.0)
+    least = -STARTED * max(1.0, float(np.max(np.abs(case.q0), initial=0.0)))
+    deep = [int(i) for i in np.argsort(gap, kind="stable") if gap[i] < least]
+    angles = turning(case.scene)
+    named = [f"{case.contacts[i]} by {-gap[i]:.2g} {'rad' if case.contacts[i] in angles else 'm'}" for i in deep]
+    more = f" and {len(deep) - NAMED} more" * (len(deep) > NAMED)
+    return f"Beyond their surfaces at the start, and pushed back: {', '.join(named[:NAMED])}{more}." if deep else ""
 
 
 def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
@@ -34,9 +55,16 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
             f"At {many} instant{'s' * (many > 1)}, from {truth.trajectory.searched_until:.4g} s on, "
             "too many contacts could change to search for a second motion."
         )
+    if many := truth.trajectory.counts.get("touches_that_gained", 0):
+        gained = truth.trajectory.energy_gained
+        told.append(
+            f"By its law {many} touch{'es' * (many > 1)} with friction gave out {gained:.3g} J more than taken in."
+        )
     if other:
         told.append(f"At {other} samples its two sources have rows in other modes.")
     told += [f"The {name} of its second source is {off:.1e}, beyond {PARTED:g}." for name, off in beside.items()]
+    if below := start_below(case, truth):
+        told.append(below)
     if short:
         told.append(f"It must be trusted to {until:.4g} s.")
     if truth.part < 1.0:

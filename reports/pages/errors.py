@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.rotations import differences
+from crossbody.cases.rotations import differences, turned
 from crossbody.reports.figures.section import Kind, Table, columns
 from crossbody.reports.figures.styles import called, label
 from crossbody.reports.runs.store import Trace
 
+STILL = 1e-6  # what has turned by less has no axis, rad
 SCALAR = " qw"  # how the name of the first entry of a quaternion ends
 LARGEST = columns(
     called="Engine", coordinate="Coordinate", size=("Largest error", Kind.NUMBER), unit="Unit",
@@ -31,11 +32,25 @@ def signals(trace: Trace) -> dict[int, tuple[str, str]]:
 
 
 def seen(q: Floats, trace: Trace) -> Floats:
-    """Return coordinates (n, nq) as they are drawn: of a quaternion, at its first, the angle from the start, rad."""
-    away = differences(q, np.broadcast_to(trace.run.q[0], q.shape), trace.quaternions)
+    """Return coordinates (n, nq) as they are drawn: of a quaternion, at its first, the angle from the start, rad.
+
+    It goes on beyond half a turn, and is negative where the motion has come back through its start.
+    """
     found = q.copy()
     for at in trace.quaternions:
-        found[:, at] = away[:, at]
+        four = slice(at, at + 4)
+        found[:, at] = _unfolded(turned(q[:, four], np.broadcast_to(trace.run.q[0, four], (len(q), 4))))
+    return found
+
+
+def _unfolded(turns: Floats) -> Floats:
+    """The angles (n,) of rotation vectors (n, 3), rad, without the jumps of their axes at half a turn and at none."""
+    sizes = np.linalg.norm(turns, axis=1)
+    known = np.flatnonzero(sizes > STILL)
+    found = np.zeros(len(turns))
+    if len(known):
+        ahead = np.where(np.sum(turns[known[1:]] * turns[known[:-1]], axis=1) < 0.0, -1.0, 1.0)
+        found[known] = np.unwrap(sizes[known] * np.cumprod(np.concatenate([[1.0], ahead])))
     return found
 
 

@@ -398,6 +398,28 @@ def steps(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) 
     return sheet.done()
 
 
+def inputs(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE) -> Figure:
+    """What acts from outside: each value from its instant on; of many those that change most."""
+    given = {label(one): one.about["inputs"] for one in traces if one.about.get("inputs")}
+    names = next((list(found[0]) for found in given.values()), [])
+    reach = np.max([np.ptp(found[2], axis=1) for found in given.values()], axis=0) if given else np.zeros(0)
+    shown = sorted(np.argsort(-reach, kind="stable")[:MOST_SIGNALS].tolist())
+    more = f" ({len(shown)} of {len(names)}, those that change most)" if len(names) > len(shown) else ""
+    sheet = Sheet([_over_unit(names[k]) for k in shown], f"What acts from outside{more}", points)
+    for trace in (one for one in traces if label(one) in given and len(one.run.t)):
+        _, times, values = given[label(trace)]
+        t = np.r_[times, max(times[-1], trace.run.t[-1])]
+        for place, k in enumerate(shown):
+            sheet.line(trace, place, np.r_[values[k], values[k][-1]], t, shape="hv")
+    return sheet.done()
+
+
+def _over_unit(name: str) -> str:
+    """A name above its unit."""
+    head, found, unit = name.partition(" [")
+    return f"{head}\n[{unit}" if found else f"{name}\n"
+
+
 def plots(
     name: str, traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE, until: float = inf
 ) -> list[Plot]:
@@ -518,6 +540,7 @@ FIGURES: dict[str, tuple[str, Callable[..., Figure]]] = {
     "modes": ("Modes", modes),
     "penetration": ("Penetration", penetration),
     "steps": ("Step size", steps),
+    "inputs": ("Inputs", inputs),
 }
 SIGNALS: dict[str, tuple[str, Callable[[Sequence[Trace]], list[int]], str]] = {
     "motion": ("coordinates", farthest, "with smaller errors"),

@@ -18,7 +18,7 @@ from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.errors import told
 from crossbody.reports.pages.figures import carrying, few, normals
-from crossbody.reports.pages.filled import filled
+from crossbody.reports.pages.filled import between
 from crossbody.reports.runs.store import Trace
 
 ROOM = 280_000  # room of the motions on a page, bytes
@@ -80,9 +80,11 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene, share: float = 1.0) -> 
     pushing = _pushing(traces, scene, parameters, bearing)
     width = 1 + scene.poses(traces[0].run.q[:1], parameters)[0].size + 2 * stage.dimensions * int(pushing.sum())
     frames = int(np.clip(share * ROOM / (16 / 3 * width * len(traces)), FEWEST, MOST))
-    drawn = [_track(trace, scene, parameters, frames, pushing) for trace in traces if len(trace.run.t)]
-    end = max((float(trace.run.t[-1]) for trace in traces if len(trace.run.t)), default=0.0)
-    for trace, track in zip((one for one in traces if len(one.run.t)), drawn, strict=True):
+    moved = [trace for trace in traces if len(trace.run.t)]
+    instants = pictures([trace.run for trace in moved], frames)
+    drawn = [_track(trace, scene, parameters, instants, pushing) for trace in moved]
+    end = max((float(trace.run.t[-1]) for trace in moved), default=0.0)
+    for trace, track in zip(moved, drawn, strict=True):
         track["happens"] = happens(trace, 0.0 if track["truth"] else end / FRAMES)
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
@@ -146,17 +148,17 @@ def _does(event: Event) -> str:
 
 
 def _track(
-    trace: Trace, scene: scenes.Scene, parameters: Mapping[str, Any], frames: int, pushing: NDArray[np.bool_]
+    trace: Trace, scene: scenes.Scene, parameters: Mapping[str, Any], instants: Floats, pushing: NDArray[np.bool_]
 ) -> dict[str, Any]:  # fmt: skip
     run = trace.run
-    t, q = filled(run, trace.quaternions)
-    at = chosen(t, np.array([e.t for e in run.events]), frames)
-    lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t[at], side="right"), 1))
-    poses, arrows = scene.poses(q[at], parameters), scene.arrows(q[at], lam, parameters)[:, pushing]
+    t = distinct(np.clip(instants, run.t[0], run.t[-1]))
+    q = between(run, t, trace.quaternions)
+    lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t, side="right"), 1))
+    poses, arrows = scene.poses(q, parameters), scene.arrows(q, lam, parameters)[:, pushing]
     look = style(trace)
     return {
         "name": label(trace), "color": look["color"], "strokes": look["strokes"],
-        "truth": label(trace) == TRUTH, "t": _single(t[at]), "poses": _single(poses),
+        "truth": label(trace) == TRUTH, "t": _single(t), "poses": _single(poses),
         "arrows": _single(arrows),
     } | _blows(run, scene, parameters, pushing)  # fmt: skip
 
@@ -176,12 +178,23 @@ def _blows(
     return {"struck": _single(run.t[at]), "blows": _single(arrows)}
 
 
-def chosen(t: Floats, events: Floats, frames: int) -> NDArray[np.intp]:
-    """Indices of samples for pictures: half evenly in time, half around the events, first and last."""
-    even = np.searchsorted(t, np.linspace(t[0], t[-1], max(2, frames // 2)))
-    some = np.linspace(0, len(events) - 1, min(len(events), frames // 8)).astype(np.intp)
-    near = np.searchsorted(t, events[some])[:, None] + np.array([-2, 0, 1, 3])
-    return distinct(np.clip(np.concatenate([even, near.ravel()]), 0, len(t) - 1))
+def pictures(runs: Sequence[Trajectory], frames: int) -> Floats:
+    """Return instants of pictures, s, the same for all motions: what lies between differs by no motion's own chords.
+
+    Half of them evenly in time, the others around the events of each motion.
+    """
+    ends = [float(run.t[at]) for run in runs for at in (0, -1)]
+    even = np.linspace(min(ends), max(ends), max(2, frames // 2))
+    return distinct(np.concatenate([even, ends, *(_near(run, frames // (2 * len(runs))) for run in runs)]))
+
+
+def _near(run: Trajectory, count: int) -> Floats:
+    """Samples beside events of one motion, evenly chosen."""
+    events = np.sort([event.t for event in run.events])
+    some = events[np.linspace(0, len(events) - 1, min(len(events), count // 4)).astype(np.intp)]
+    near = np.searchsorted(run.t, some)[:, None] + np.array([-2, 0, 1, 3])
+    found: Floats = run.t[np.clip(near.ravel(), 0, len(run.t) - 1)]
+    return found
 
 
 def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:

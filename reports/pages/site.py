@@ -41,8 +41,7 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
     if output.is_staged(out):
         _make(out, single_file, against, others)
         return out / PAGE
-    if not output.is_ours(out):
-        raise OutputError(f"{out} was not written by crossbody; name the folder of an earlier run.")
+    output.require_ours(out, "run")
     with output.folder(out, "report", adds=True) as made:
         _make(made, single_file, against, others)
     return out / PAGE

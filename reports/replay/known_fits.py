@@ -9,6 +9,7 @@ of freedom has at 97.5 %.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from functools import cache
 
@@ -91,3 +92,10 @@ def _link() -> Iterator[Within]:
     fit = hw.identify(log, "single_pendulum", ["I1"], parameters=given, restart=0.0, hold=0)
     wanted = known.INERTIA + float(x[0]), float(std[0]), float(half[0])
     yield from _told("I1", "a link with noise", fit["I1"], wanted, CURVED)
+    more = 1e-4 * known.DRAG
+    drags = (known.turned(t, drag=known.DRAG + more) - known.turned(t, drag=known.DRAG - more)) / (2.0 * more)
+    both = np.column_stack([J, drags])
+    covariance = np.linalg.inv(both.T @ both)
+    fit = hw.identify(log, "single_pendulum", ["I1", "k1"], parameters=given, restart=0.0, hold=0)
+    together = float(covariance[0, 3] / math.sqrt(covariance[0, 0] * covariance[3, 3]))
+    yield "correlation of I1 and k1", "a link with noise", float(fit.correlation[0, 1]), together, CURVED

@@ -113,13 +113,13 @@ def wrong() -> tuple[Found, ...]:
     return unlike(kinds, "log", "a log that ends in")
 
 
-def turned(t: Floats, inertia: float = INERTIA) -> Floats:
+def turned(t: Floats, inertia: float = INERTIA, drag: float = DRAG) -> Floats:
     """Return the angles of a link (n,), rad, at instants t of its log, s: the sum of its answers to each change."""
     J, before = inertia + MASS * REACH**2, 0.0
-    found: Floats = ANGLE + RATE * (J / DRAG) * (1.0 - np.exp(-DRAG / J * t))
+    found: Floats = ANGLE + RATE * (J / drag) * (1.0 - np.exp(-drag / J * t))
     for k, torque in enumerate(TORQUES):
         gone = np.maximum(t - k * HELD, 0.0 if k else -np.inf)
-        found += (torque - before) / DRAG * (gone - (J / DRAG) * (1.0 - np.exp(-DRAG / J * gone)))
+        found += (torque - before) / drag * (gone - (J / drag) * (1.0 - np.exp(-drag / J * gone)))
         before = torque
     return found
 

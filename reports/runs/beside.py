@@ -7,7 +7,7 @@ from pathlib import Path
 
 from crossbody.cases import OutputError
 from crossbody.reports.runs import files
-from crossbody.reports.runs.output import is_ours, recover
+from crossbody.reports.runs.output import recover, require_ours
 
 OWN = ("verdicts", "audit", "provenance")
 """Of every folder; they stay those of the folder that is taken into."""
@@ -21,8 +21,7 @@ def tables(folder: Path) -> list[Path]:
         OutputError: if it is not one of ours, or holds no study.
     """
     recover(folder)
-    if not is_ours(folder):
-        raise OutputError(f"{folder} was not written by crossbody; name the folder of an earlier study.")
+    require_ours(folder, "study")
     paths = (folder / name for name in files.listed(folder))
     found = [path for path in paths if path.suffix in TABLES and path.stem not in OWN]
     if not found:

@@ -99,6 +99,8 @@ def read(folder: Path) -> Manifest:
         text = files.read_inside(folder, MARKER).decode("utf-8", errors="replace")
     except FileNotFoundError:
         return Manifest()
+    except NotADirectoryError:
+        raise OutputError(f"{folder} is not a folder; name one that crossbody wrote.") from None
     except OutputError:
         raise
     except OSError as error:

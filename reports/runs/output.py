@@ -22,7 +22,18 @@ from crossbody.reports import voice
 from crossbody.reports.runs import files, manifest
 from crossbody.reports.runs.manifest import JUDGED, MARKER, Manifest, replace_text
 
-__all__ = ["MARKER", "check", "folder", "gather", "is_ours", "is_staged", "recover", "replace_text", "tables"]
+__all__ = [
+    "MARKER",
+    "check",
+    "folder",
+    "gather",
+    "is_ours",
+    "is_staged",
+    "recover",
+    "replace_text",
+    "require_ours",
+    "tables",
+]
 
 NEW, READY = ".crossbody-new.", ".crossbody-ready."
 PLAN = ".plan.json"
@@ -60,6 +71,23 @@ def is_staged(path: Path) -> bool:
 def is_ours(path: Path) -> bool:
     """Whether crossbody has written into a folder."""
     return (path / MARKER).is_file()
+
+
+def require_ours(path: Path, what: str) -> None:
+    """Require a folder into which crossbody has written.
+
+    Args:
+        path: the folder.
+        what: that it holds, as the user is asked for it.
+
+    Raises:
+        OutputError: if there is none, or crossbody has not written into it.
+    """
+    if not is_ours(path):
+        found = "was not written by crossbody" if path.is_dir() else "is not a folder"
+        raise OutputError(
+            f"{path} {found if path.exists() else 'does not exist'}; name the folder of an earlier {what}."
+        )
 
 
 def tables(path: Path) -> list[str]:

@@ -193,7 +193,7 @@ def traces(result: CaseResult) -> list[Trace]:
     about = _about(case, TRUTH, "") | {"tier": truth.tier.value, "source": truth.source}
     about["scales"] = scale_of(truth.trajectory, case).tolist()
     about["gap_scales"], about["still"] = _gap_scales(truth, case), still(truth.trajectory)
-    found = [Trace(about=about, run=truth.trajectory)]
+    found = [Trace(about=about | _inputs(case, truth.trajectory), run=truth.trajectory)]
     return found + [_trace(case, entry, truth) for entry in result.entries if entry.run is not None]
 
 
@@ -211,6 +211,7 @@ def _trace(case: Case, entry: Entry, truth: Truth) -> Trace:
     about = _about(case, entry.engine, entry.profile) | {"settings": dict(entry.settings)}
     about["took_s"] = entry.took_s
     about["steps"] = _steps((entry.run if entry.clock is None else entry.clock.run).t)
+    about |= _inputs(case, entry.run)
     return Trace(about=about, run=entry.run, truth=_beside(truth, entry.run, case))
 
 
@@ -232,6 +233,15 @@ def _beside(truth: Truth, run: Trajectory, case: Case) -> Trajectory | None:
         energy=put(exact.energy),
         mode=np.where(inside[:, None], np.nan_to_num(put(exact.mode.astype(np.float64))), -1).astype(np.int8),
     )  # fmt: skip
+
+
+def _inputs(case: Case, run: Trajectory) -> dict[str, Any]:
+    """Names, instants and values (nu, m) of what acted on a run from outside, as many as a plot shows; if anything."""
+    given = case.inputs if run.inputs is None else run.inputs
+    if given is None or not given.names or not len(given.times):
+        return {}
+    kept = distinct(*(keep(given.times, column, np.zeros(0)) for column in given.values.T))
+    return {"inputs": [list(given.names), given.times[kept].tolist(), given.values[kept].T.tolist()]}
 
 
 def _steps(t: Floats) -> list[list[float]]:

@@ -87,6 +87,8 @@ def test_a_part_says_what_is_wrong_with_it_and_what_would_be_valid(
 
 ROD = Body(name="rod", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
 HINGE = Joint(name="hinge", body="rod", type="hinge")
+SHAPES = (Shape(name="floor", type="plane"), Shape(name="ball", body="rod"))
+MEET = Pair(name="meet", first="floor", second="ball")
 ARM, TIP = Body(name="arm"), Body(name="tip", parent="rod")
 
 
@@ -98,6 +100,8 @@ ARM, TIP = Body(name="arm"), Body(name="tip", parent="rod")
     ({"bodies": (ROD, TIP), "joints": (Joint(name="free", body="tip", type="free"),)}, "a free joint is only possible"),
     ({"bodies": (ROD, ARM), "joints": (Joint(name="x", body="arm", type="slide"), HINGE)}, "the order of the bodies"),
     ({"bodies": (ROD, ARM, TIP)}, "branch by branch"),
+    ({"shapes": SHAPES, "pairs": (MEET, dataclasses.replace(MEET, name="again", first="ball", second="floor"))},
+     "Pairs 'meet' and 'again' are of the same shapes, 'ball' and 'floor'"),
 ])  # fmt: skip
 def test_a_scene_says_which_of_its_parts_do_not_go_together(parts: dict[str, Any], told: str) -> None:
     with pytest.raises(SceneError, match=told):

@@ -60,7 +60,8 @@ def test_what_is_wrong_is_named_by_its_path(change: tuple[str, str], key: str, s
         hw.parse_columns(GOOD.replace(*change), "rig.toml")
     assert told.value.key == key
     assert says in str(told.value)
-    assert str(told.value).startswith("rig.toml: $")
+    assert str(told.value).startswith("rig.toml: " if key == "$" else f"rig.toml: {key}: ")
+    assert "$: " not in str(told.value)  # the whole file has no path inside it
 
 
 def test_a_map_without_signals_is_refused() -> None:

@@ -67,20 +67,23 @@ def test_a_box_that_falls_on_its_edge_comes_to_rest(slope: cases.Case, rtol: flo
     assert found.determined_until == np.inf  # four corners that slide for 1e-9 s, or by 1e-5 m/s, leave nothing open
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_a_box_that_nearly_falls_on_its_edge_goes_on(slope: cases.Case, seed: int) -> None:
-    """Three corners would jam together; without one of them the others go on, and no law says which.
+LOST = pytest.mark.xfail(
+    strict=True, reason="where three corners jam to 2e-9 the sets that go on are off by 1e-6 and are not taken"
+)
 
-    Of all that start as near two in thirty come to a jam by another way: behind an instant at which several sets hold
-    rounding chooses one, which is told.
-    """
+
+@pytest.mark.parametrize(
+    "seed",
+    [0, 1, 2, pytest.param(3, marks=LOST), 4, 5, *(pytest.param(k, marks=pytest.mark.slow) for k in range(6, 12))],
+)
+def test_a_box_that_nearly_falls_on_its_edge_goes_on(slope: cases.Case, seed: int) -> None:
+    """Three corners would jam together; without one of them the others go on, and no law says which."""
     made, q0 = system(slope.scene, slope.law), slope.q0.copy()
     q0[:7] += 1e-6 * np.random.default_rng(seed).normal(size=7)
     q0[3:7] /= np.linalg.norm(q0[3:7])
     found = simulate(made, q0, slope.v0, 0.6, rtol=1e-9, ledger=True, max_steps=MOST_STEPS)
-    assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
     assert max(found.unique_until, found.determined_until) < found.t[-1]
-    assert found.outcome is Outcome.FINISHED or not goes_on(slope.scene, found)
+    assert found.outcome is Outcome.FINISHED, found.message
 
 
 def dropped(seed: int) -> tuple[Any, np.ndarray, float]:

@@ -138,6 +138,26 @@ def test_a_weight_that_a_growing_force_lifts() -> None:
     np.testing.assert_allclose(found.by_parameters[[1, 3], 0], expected, atol=1e-7)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_blocks_under_a_growing_force_slide_stop_and_go_on(seed: int) -> None:
+    """Downhill, uphill, on a belt, or from rest: whatever is called finished has the derivative of runs."""
+    rng = np.random.default_rng(seed)
+    one = pushed(_growing, float(rng.uniform(0.2, 1.2)), float(rng.uniform(0.0, 0.5)))
+    v, T = [float(rng.normal()), 0.0], 1.5
+    found = sensitivity(one, [0, 0], v, T, parameters=["mu[0]", f"p[{len(one.p) - 1}]"])
+    assert found.outcome is Outcome.FINISHED, found.message
+
+    def end(y: np.ndarray) -> np.ndarray:
+        moved = replace(one, mu=np.where(np.isfinite(one.mu), y[1], one.mu), parameters=[*one.p[:-1], y[2]])
+        return ends(moved, [0, 0], [y[0], 0.0], T, "compiled")
+
+    y = np.array([v[0], float(one.mu[1]), GROWS])
+    tried = [differences(end, y, step) for step in (1e-4, 3e-5, 1e-5)]
+    best = min(pairwise(tried), key=lambda two: np.abs(two[0] - two[1]).max())[1]
+    got = np.column_stack([found.by_start[:, 2], found.by_parameters])
+    np.testing.assert_allclose(got, best, atol=1e-6)
+
+
 @pytest.mark.parametrize("space", [False, True])
 def test_a_slide_from_rest_has_one_sided_derivatives_by_its_start(space: bool) -> None:
     """Thrown uphill it comes back later than it was thrown downhill; by friction there is one derivative."""

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from friction_scenes import box_on_floor, run, tipped
+from friction_scenes import HALF, G, box_on_floor, run, tipped
+from scipy.optimize import linprog
 
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.balance import Balance
@@ -74,3 +75,23 @@ def test_another_share_moves_a_box_that_spins_and_slides(part: float, monkeypatc
     other = run(box_on_floor(0.3), *start, rtol=1e-8, solver="cvode")
     assert np.abs(one.q[-1] - other.q[-1]).max() > 1e-3
     assert 0.0 < one.determined_until < 1e-3
+
+
+def _open_accelerations(speed: float, spin: float, mu: float) -> float:
+    """By how much the acceleration across its way of a box that slides and spins flat is open, m/s^2: all shares that
+    hold it up and upright.
+    """
+    x, y = np.array([[i * HALF[0], j * HALF[1]] for i in (-1, 1) for j in (-1, 1)]).T
+    slip = np.array([speed - spin * y, spin * x])
+    push = -mu * slip / np.linalg.norm(slip, axis=0)
+    equal = np.array([np.ones(4), y + HALF[2] * push[1], x + HALF[2] * push[0]])
+    least, most = (sign * linprog(sign * push[1], A_eq=equal, b_eq=[G, 0, 0]).fun for sign in (1.0, -1.0))
+    return float(most - least)
+
+
+@pytest.mark.parametrize("spin", [0.01, 0.03, 0.1, 0.3, 1.0])
+def test_no_motion_is_determined_for_longer_than_shares_move_nothing(spin: float) -> None:
+    one = run(box_on_floor(0.3), [0, 0, HALF[2], 1, 0, 0, 0], [1.0, 0, 0, 0, 0, spin], 0.2, rtol=1e-9)
+    until = min(one.determined_until, one.t[-1])
+    assert until > 0.0
+    assert 0.5 * _open_accelerations(1.0, spin, 0.3) * until**2 <= PARTED

@@ -15,6 +15,7 @@ from random_scenes import random_scene, random_state, with_own_laws
 from crossbody import cases, engines
 from crossbody.cases import Case, Claim, Limit, Mode, Tier
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
+from crossbody.engines.equations import system_of
 from crossbody.reports import metrics
 from crossbody.reports.judging import audit, comparison, controls, judge_controls, known, planted, run_verdicts, verdict
 from crossbody.reports.judging.comparison import judged
@@ -55,6 +56,15 @@ def blind(case: Case, truth: Truth) -> list[Verdict]:
 def test_every_fault_of_a_shipped_case_is_seen(name: str, variant: str) -> None:
     case = cases.load(name, variant)
     assert blind(case, truth_of(case)) == []
+
+
+def test_cases_that_ask_no_answers_of_scenes_have_no_friction_and_no_drive() -> None:
+    asked = [case for case in map(cases.load, cases.names()) if judge_controls.plain(case)]
+    assert {"bouncing_ball", "newtons_cradle"} <= {case.name for case in asked}
+    for case in asked:
+        system = system_of(case)
+        assert not system.frictional
+        assert (system.inputs, system.control, system.activations) == (0, None, None)
 
 
 def test_all_metrics_that_every_case_limits_have_a_control() -> None:

@@ -13,13 +13,15 @@ import numpy as np
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import Trajectory
+from crossbody.cases import Trajectory, rotations
 from crossbody.reports.judging import (
     judge_controls,
     known,
+    known_arithmetic,
     known_files,
     known_growth,
     known_parts,
+    known_samples,
     known_sides,
     known_steps,
     known_tables,
@@ -139,6 +141,29 @@ def test_growth_that_depends_on_the_unit_of_time_is_told(times: float, monkeypat
         )  # fmt: skip
         assert known_growth.wrong()
     known_growth.wrong.cache_clear()
+
+
+@pytest.mark.parametrize(("module", "of", "name", "said"), [
+    (known_arithmetic, rotations, "turned", {"signed", "differences", "ways", "drifts"}),
+    (known_arithmetic, rotations, "matrices", {"matrices"}),
+    (known_arithmetic, known_arithmetic, "spline", {"spline"}),
+    (known_samples, known_samples, "multipliers", {"multipliers"}),
+])  # fmt: skip
+def test_arithmetic_that_is_off_by_a_millionth_is_told(
+    module: Any, of: Any, name: str, said: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = getattr(of, name)
+
+    def off(*given: Any) -> Any:
+        found = own(*given)
+        return found if found is None else found * (1.0 + 1e-6)
+
+    monkeypatch.setattr(of, name, off)
+    module.wrong.cache_clear()
+    try:
+        assert {found for found, *_ in module.wrong()} == said
+    finally:
+        module.wrong.cache_clear()
 
 
 def test_steps_that_err_are_told(monkeypatch: pytest.MonkeyPatch) -> None:

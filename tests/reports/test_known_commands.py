@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from crossbody.cases.errors import OwnFault
 from crossbody.cases.mechanisms.cradle import rules
-from crossbody.hw.fitting import covariance, difference
+from crossbody.hw.fitting import covariance, difference, doubts
 from crossbody.hw.reading import repair
 from crossbody.hw.reading.plan import Source
 from crossbody.hw.replaying import measures
@@ -22,7 +22,7 @@ from crossbody.reports.cli import cli
 from crossbody.reports.judging import known
 from crossbody.reports.maps import gapmap, known_maps, known_rules
 from crossbody.reports.pages import known_pictures
-from crossbody.reports.replay import known_fits, known_formats, known_replay
+from crossbody.reports.replay import known_doubts, known_fits, known_formats, known_replay
 from crossbody.reports.suites.axis import Log
 from crossbody.reports.sweep import execute, known_sweep
 
@@ -38,14 +38,17 @@ COMMANDS = {
     "gapmap": ("gapmap", "--n", "2", "--points", "2", "-q", "--out", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
 }  # fmt: skip
-MODULES = {"replay": known_replay, "identify": known_fits, "bench": known_bench, "analyse": known_analysis,
-           "picture": known_pictures, "stress": known_sweep, "gapmap": known_maps, "rules": known_rules}  # fmt: skip
+MODULES = {
+    "replay": known_replay, "identify": known_fits, "doubts": known_doubts, "bench": known_bench,
+    "analyse": known_analysis, "picture": known_pictures, "stress": known_sweep, "gapmap": known_maps,
+    "rules": known_rules,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MODULES)
 def test_what_is_right_is_not_told(name: str) -> None:
     assert MODULES[name].wrong() == ()
-    known.check({"identify": "replay", "rules": "gapmap"}.get(name, name))
+    known.check({"identify": "replay", "doubts": "replay", "rules": "gapmap"}.get(name, name))
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -61,11 +64,13 @@ def test_a_command_ends_where_an_answer_is_wrong(name: str, monkeypatch: pytest.
     assert not (tmp_path / "out").exists()
 
 
+CACHED = ("wrong", "link_log", "_hanging", "_flight")
 OFF: dict[str, tuple[Any, str, Any]] = {
     "replay": (measures, "bias", lambda y, yhat: float(np.mean(y - yhat))),
     "replay in a unit": (Source, "to_si", lambda source, raw: source.conversion.apply(raw)),
     "replay without repairs": (repair, "GAP", 9.0),
     "identify with intervals": (covariance, "LEVEL", 0.8),
+    "doubts of halves": (doubts, "FEWEST", 1000),
     "identify with steps": (difference, "STEP", 1e-13),
     "bench": (measure, "NATIVE", 1),
     "stress": (known_sweep, "residual", lambda run: 0.0),
@@ -82,14 +87,14 @@ OFF: dict[str, tuple[Any, str, Any]] = {
 def test_a_number_that_is_off_is_told(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     module = MODULES[what.split()[0]]
     own, name, other = OFF[what]
-    for cached in ("wrong", "link_log", "_hanging"):
+    for cached in CACHED:
         if hasattr(module, cached):
             getattr(module, cached).cache_clear()
     monkeypatch.setattr(own, name, other)
     try:
         assert module.wrong()
     finally:
-        for cached in ("wrong", "link_log", "_hanging"):
+        for cached in CACHED:
             if hasattr(module, cached):
                 getattr(module, cached).cache_clear()
 

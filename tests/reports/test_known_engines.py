@@ -10,7 +10,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, EngineUnavailable, Inputs, Outcome
-from crossbody.reports.judging import known_drives, known_engines
+from crossbody.reports.judging import known, known_drives, known_engines
 from crossbody.reports.judging.steps_taken import miscounted
 
 
@@ -20,7 +20,8 @@ def test_engines_give_their_known_answers(name: str) -> None:
         engines.load(name)
     except EngineUnavailable as missing:
         pytest.skip(str(missing))
-    assert (*known_engines.wrong(name), *known_drives.wrong(name)) == ()
+    asked = known.kinds((*known.OF_ENGINES, *known.OF_CONTACTS, *known.OF_DRIVES))
+    assert [module.wrong(name) for module in asked] == [()] * len(asked)
 
 
 @pytest.mark.parametrize(("given", "what"), [({"rtol": 1e-8}, "(steps)"), ({"max_steps": 10_000}, "(max_steps)")])

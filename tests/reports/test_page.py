@@ -99,7 +99,7 @@ def plots(out: Path) -> dict[str, dict]:
 
 def test_every_figure_is_there_and_has_data(out: Path) -> None:
     found = plots(out)
-    assert set(found) == {*figures.FIGURES, "hysteresis", "precision"}
+    assert set(found) == {*figures.FIGURES, "hysteresis", "precision"} - {"inputs"}  # nothing drives a ball
     for name, figure in found.items():
         assert figure["data"], name
 

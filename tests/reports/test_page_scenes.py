@@ -6,7 +6,8 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.pages.case_page import PLOTTED
 from crossbody.reports.pages.figures import FIGURES, points_for
 from crossbody.reports.pages.html import packed_value
-from crossbody.reports.pages.playback import chosen, packed, peaks, playback
+from crossbody.reports.pages.playback import packed, peaks, pictures, playback
 from crossbody.reports.runs import study
 from crossbody.reports.runs.store import Trace
 
@@ -260,13 +261,49 @@ def test_peaks_miss_no_blow() -> None:
     lam = np.zeros((1000, 2))
     lam[437, 1], lam[10, 0], lam[998, 0] = -50.0, np.nan, 7.0
     t = np.linspace(0.0, 1.0, 1000)
-    at = chosen(t, np.array([0.25]), 40)
-    assert at[0] == 0
-    assert at[-1] == 999
-    found = peaks(lam, at + 1)
+    event = Event(t=0.25, contact=0, before=Mode.FREE, after=Mode.CONTACT)
+    shown = pictures([cast(Trajectory, SimpleNamespace(t=t, events=(event,)))], 40)
+    assert (shown[0], shown[-1]) == (0.0, 1.0)
+    assert {t[248], t[250], t[251], t[253]} <= set(shown)
+    found = peaks(lam, np.maximum(np.searchsorted(t, shown, side="right"), 1))
     assert found[:, 1].min() == -50.0
     assert found[:, 0].max() == 7.0
     assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_difference_made_larger_is_that_of_the_motions_and_not_of_their_chords(seed: int) -> None:
+    """Two runs of one fall, each with steps of its own: at any instant their pictures are in one place."""
+    rng = np.random.default_rng(seed)
+    case = cases.load("bouncing_ball", "linear")
+    trace = trace_of(case)
+
+    def seen() -> Trace:
+        t = np.unique(np.concatenate([[0.0, 0.4], rng.uniform(0.0, 0.4, rng.integers(2, 30))]))
+        q, v = (1.0 - 0.5 * 9.81 * t**2)[:, None], (-9.81 * t)[:, None]
+        rows = {name: np.zeros((len(t), 1)) for name in ("gap", "lam")}
+        own = replace(
+            trace.run,
+            t=t,
+            q=q,
+            v=v,
+            mode=np.zeros((len(t), 1), dtype=int),
+            events=(),
+            energy=np.zeros((len(t), 2)),
+            ledger=None,
+            **rows,
+        )
+        return replace(trace, run=own)
+
+    one, two = packed([seen(), seen()], scenes.load(case.mechanism))["tracks"]
+    places = []
+    for track in (one, two):
+        t = numbers(track["t"])
+        poses = numbers(track["poses"]).reshape(len(t), -1)
+        heights = poses[:, np.argmax(np.ptp(poses, axis=0))]
+        assert np.ptp(heights) > 0.7
+        places.append(np.interp(np.linspace(0.0, 0.4, 997), t, heights))
+    np.testing.assert_allclose(*places, rtol=0.0, atol=1e-6)  # single precision of 1 m
 
 
 @pytest.mark.parametrize(("name", "variant"), CASES)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from entry_points import wrong_arguments
-from wrong_calls import Call, _logs, arguments_of_entry_points, calls, failure, fields_of_a_system
+from wrong_calls import COSTLY, Call, _logs, arguments_of_entry_points, calls, failure, fields_of_a_system, make_files
 
 from crossbody import cases
 from crossbody.cases import CrossbodyError, InvalidValue, Outcome, SceneError, UnknownName
@@ -23,7 +23,8 @@ from crossbody.reference import simulate
 from crossbody.reports import cli, commands
 from crossbody.reports.analysis import bode
 from crossbody.reports.bench import measure, skip, throughput
-from crossbody.reports.commands import analyse, stress
+from crossbody.reports.commands import analyse, cache, stress
+from crossbody.reports.judging import known
 from crossbody.reports.maps import gapmap, stability
 from crossbody.reports.runs import jobs
 
@@ -41,15 +42,15 @@ def cheap(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A folder to be in, and commands that stop where they would begin to compute; a fault of ours is one here."""
 
     def stop(*_: Any, **__: Any) -> Any:
-        raise CrossbodyError("From here on it takes time.")
+        raise CrossbodyError(COSTLY)
 
     costly = ((jobs, "run_case"), (measure, "bench"), (skip, "measure"), (throughput, "measure"), (stress, "sweep"))
     more = ((gapmap, "gap_map"), (stability, "stability_map"), (bode, "soft_contact"), (analyse, "places"))
-    for module, name in costly + more:
+    all_names = ((cache, "warm"), (cache, "clear"), (known, "check"))  # `clear` would remove the code of these tests
+    for module, name in costly + more + all_names:
         monkeypatch.setattr(module, name, stop)
     monkeypatch.setattr(cli, "_crashed", _raise)
-    (tmp_path / "file").write_text("x")
-    (tmp_path / "folder").mkdir()
+    make_files(tmp_path)
     assert commands
     return tmp_path
 
@@ -157,3 +158,12 @@ def test_a_wrong_name_is_told_before_the_reference_is_compiled(words: tuple[str,
     assert done.returncode == 2, done.stderr
     assert "nope" in done.stderr
     assert len([*kept.rglob("*.code")]) < 20  # kernels that are none's; the reference has 300 functions
+
+
+@pytest.mark.parametrize("words", [("report", "{}"), ("picture", "{}", "a.svg"), ("run", "--with", "{}")])
+@pytest.mark.parametrize(("name", "said"), [("none", "does not exist"), ("file", "is not a folder")])
+def test_a_folder_of_an_earlier_run_that_is_none_is_told(
+    words: tuple[str, ...], name: str, said: str, cheap: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert cli._obey([word.format(name) for word in words]) == 2
+    assert f"{name} {said}" in capfd.readouterr().err

@@ -22,7 +22,7 @@ def ladder(path: Path, case: str, profile: str = "p", rows: int = 3) -> Path:
             "outcome": "finished",
         }
     )  # fmt: skip
-    lead = pd.DataFrame({"case": [case], "engine": ["fake"], "profile": [profile], "ratio": [42.0]})
+    lead = pd.DataFrame({"case": [case], "engine": ["fake"], "profile": [profile], "ratio": [42.0], "ahead": ["yes"]})
     order = pd.DataFrame(columns=["case", "engine", "profile", "knob", "order", "promised", "says"])
     told = {"command": "crossbody bench"}
     with folder(path) as made_:

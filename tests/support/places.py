@@ -7,6 +7,7 @@ from pathlib import Path
 
 TESTS = Path(__file__).parent.parent
 ROOT = TESTS.parent
+FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 DATA = Path(os.environ.get("CROSSBODY_DATA", ROOT.parent / "shared" / "data"))
 ROBOTS = DATA / "robots"
 STUCK, OWN = (TESTS / "support" / name for name in ("stuck_engine.py", "own_case.py"))

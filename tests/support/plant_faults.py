@@ -32,10 +32,9 @@ from pathlib import Path
 from py_compile import PycInvalidationMode
 from queue import SimpleQueue
 
-from places import DATA, ROOT
+from places import DATA, FOLDERS, ROOT
 
 FAULTS = ROOT / "tests" / "faults.toml"
-FOLDERS = ("cases", "engines", "hw", "reference", "reports")
 RUN_SEES, ALL_SEE = 7 / 8, 39 / 40
 LIMIT_S = 1800.0
 BEGIN = ("-c", "from crossbody.reports.entry import main; main()")

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import math
 import random
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 
 from crossbody import cases, engines, hw, reports
@@ -20,6 +23,8 @@ from crossbody.reference import Options, System, ensemble, linear, prepare, rech
 from crossbody.reports import cli
 
 BOUNDED = {"max_steps": 300, "time_limit": 2.0}
+COSTLY = "From here on it takes time."
+"""What commands say that are stopped where they would begin to compute."""
 
 
 @dataclass(frozen=True)
@@ -313,20 +318,6 @@ def _scanned(**given: Any) -> None:
             pass
 
 
-COMMANDS = (
-    "list",
-    "run",
-    "bench",
-    "gapmap",
-    "stability",
-    "stress",
-    "bode",
-    "analyse",
-    "report",
-    "replay",
-    "identify",
-    "log",
-)
 WORDS = (
     "bouncing_ball", "nonsense", "soft_contact", "delta_impulse", "", "--", "-e", "mujoco", "reference:nonsense",
     "absent",
@@ -340,12 +331,56 @@ WORDS = (
 )  # fmt: skip
 
 
+FILES = {
+    "file": "x", "empty.xml": "", "cut.xml": "<mujoco><worldbody><body", "cut.urdf": "<robot name='a'><link", "nan.csv":
+    "t,x\n0,1\n1,nan\n2,inf\n", "text.csv": "a;b\nc;d\n", "empty.csv": "", "cut.toml": "[time\n", "bad.py": "def (",
+}  # fmt: skip
+FOLDERS = ("folder", "folder.xml", "folder.csv")
+"""What is no case, robot, log or output folder; in the folder that one works in."""
+
+
+def make_files(folder: Path) -> None:
+    """Make these."""
+    for name, text in FILES.items():
+        (folder / name).write_text(text)
+    for name in FOLDERS:
+        (folder / name).mkdir()
+
+
+def _value(rng: random.Random) -> str:
+    return rng.choice((*WORDS, *FILES, *FOLDERS))
+
+
+def _words(rng: random.Random) -> list[str]:
+    """Return a command with its arguments and some of its own options, each with a value that it may not admit."""
+    words, command = list[str](), cli.cli
+    while isinstance(command, click.Group) and command.commands:
+        words.append(rng.choice(sorted(command.commands)))
+        command = command.commands[words[-1]]  # type: ignore[assignment]
+    for one in command.params:
+        if isinstance(one, click.Argument):
+            words += [_value(rng) for _ in range(rng.randrange(3) if one.nargs < 0 else rng.choice((1, 1, 1, 0)))]
+    options = [one for one in command.params if isinstance(one, click.Option)]
+    for one in rng.choices(options, k=rng.randrange(4)):
+        words += [rng.choice(one.opts), *(_value(rng) for _ in range(0 if one.is_flag else one.nargs))]
+    return words
+
+
+def _below() -> dict[Path, int]:
+    return {path: path.stat().st_size for path in Path().rglob("*") if "__pycache__" not in path.parts}
+
+
 def _command(rng: random.Random) -> Call:
-    words = [rng.choice(COMMANDS), *rng.choices(WORDS, k=rng.randrange(7))]
+    """A command with words of any kind or with its own options; what it refuses, it has not begun to write."""
+    words = _words(rng) if rng.random() < 0.7 else [rng.choice(sorted(cli.cli.commands)), *rng.choices(WORDS, k=3)]
 
     def make() -> None:
-        code = cli._obey(words)
+        before, said = _below(), io.StringIO()
+        with redirect_stderr(said), redirect_stdout(io.StringIO()):
+            code = cli._obey(words)
         assert code in (0, 1, 2), f"exit code {code}"
+        assert code != 2 or said.getvalue().startswith("crossbody: "), said.getvalue()
+        assert code != 2 or COSTLY in said.getvalue() or _below() == before, "something was written"
 
     return Call(f"crossbody {words!r}", make)
 
