@@ -34,7 +34,7 @@ def test_over_all_tosses_the_reference_and_mujoco_cannot_be_told_apart() -> None
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_neither_can_be_told_apart_with_the_constants_of_the_other_half() -> None:
-    """Damping of the reference and the time constant of MuJoCo are those that miss least in one half of the tosses; the other is judged."""
+    """Damping or time constant of either is what misses least in one half of the tosses; the other half is judged."""
     logs = tosses(1)
     own = np.array([missed(logs, "reference", parameters={"a1": a1}) for a1 in (400.0, 640.0, 1000.0)])
     theirs = np.array([missed(logs, "mujoco", settings={"timeconst": time}) for time in (2e-3, 4e-3, 8e-3)])
