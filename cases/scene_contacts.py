@@ -304,7 +304,7 @@ def check_pairs(scene: Scene) -> None:
 
 def unknown_friction(scene: Scene, pair: Pair) -> str:
     """Return why the machine does not know the friction of a pair; empty if it knows it."""
-    if pair.dimension == 1:
+    if pair.dimension == 1 or (pair.dimension == 3 and not any(pair.friction[:2])):
         return ""
     if pair.dimension != 3:
         many = f"dimension={pair.dimension}, condim in a file"

@@ -99,7 +99,14 @@ def settings(case: Case, profile: str) -> dict[str, Parameter]:
     """Return who reads the file, MuJoCo or the project, which builds its scene; and how friction acts."""
     reader = {"reader": Parameter(default="file", choices=("file", "scene"), doc="who reads the file")}
     found = reader if profile == "as_is" else {}
-    return found | CONES if case.scene is not None and rough(case.scene) else found
+    rubs = _rubs(_from_file(case)) if profile == "as_is" else case.scene is not None and rough(case.scene) is not None
+    return found | CONES if rubs else found
+
+
+def _rubs(model: Any) -> bool:
+    """Whether shapes of a file may touch with friction: MuJoCo computes it also where the scene has no rows for it."""
+    touching = (model.geom_contype | model.geom_conaffinity) != 0
+    return bool((model.geom_condim[touching] > 1).any() or (model.pair_dim > 1).any())
 
 
 def default_step(case: Case, profile: str) -> float:

@@ -15,7 +15,7 @@ from crossbody.cases import Case, Coordinate, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.contacts import contacts
 from crossbody.reports.measuring.equations import equations, spread
-from crossbody.reports.measuring.friction import slips
+from crossbody.reports.measuring.friction import rubbing, slips
 from crossbody.reports.measuring.scale import rounded
 from crossbody.reports.measuring.truth import taken
 
@@ -540,7 +540,7 @@ def switched(plain: Plain) -> Iterator[Control]:
     between = {Mode.STICK, Mode.SLIP}
     turns = [e for e in run.events if {e.before, e.after} == between]
     for slides, metric in ((False, "stick_times"), (True, "slip_times")):
-        for event in [e for e in turns if (e.after == Mode.SLIP) == slides][-1:]:
+        for event in [e for e in turns if (e.after == Mode.SLIP) == slides and _of_pair(plain, e)][-1:]:
             off = 0.05 * _since_last(run, event)
             same = [e for e in run.events if e.t == event.t]
             if not _shows(plain, event, event.t - off):
@@ -549,6 +549,18 @@ def switched(plain: Plain) -> Iterator[Control]:
                 fault=f"a change between slip and stick {off:.3g} s early", run=shifted(run, same, -off),
                 sees={metric: exactly(off)},
             )  # fmt: skip
+
+
+def _of_pair(plain: Plain, event: Event) -> bool:
+    """Whether a place of a pair begins to slide as its first, or holds as its last: others' changes are no instants."""
+    found = rubbing(plain.run, plain.case)
+    if found is None:
+        return False
+    times, own = plain.run.t, found.rows == event.contact
+    mates = found.rows[np.isin(found.pair, found.pair[own]) & ~own]
+    before, after = int(np.searchsorted(times, event.t)) - 1, int(np.searchsorted(times, event.t, side="right"))
+    beside = max(before, 0) if event.after == Mode.SLIP else min(after, len(times) - 1)
+    return not (plain.run.mode[beside, mates] == Mode.SLIP).any()
 
 
 def _shows(plain: Plain, event: Event, t: float) -> bool:

@@ -25,6 +25,9 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.engines.equations import system_of
 
+DEPENDENT = 1e-10
+"""Singular value of G, over the largest, below which rows depend: the corners of a box share its weight."""
+
 
 def made(run: Trajectory, case: Case) -> float | None:
     """Sum of the jumps over all instants at which rows are switched, J; NaN if the motion is not finite.
@@ -52,7 +55,7 @@ def made(run: Trajectory, case: Case) -> float | None:
 
 
 def potential(system: Any, q: Floats, on: NDArray[np.bool_]) -> float:
-    """1/2 a0 h_A^T G_A^-1 h_A of the rows that are on, J.
+    """1/2 a0 h_A^T G_A^-1 h_A of the rows that are on, J; of rows that depend on each other the pseudoinverse.
 
     Args:
         system: the mechanism, all rows with one a0.
@@ -63,7 +66,7 @@ def potential(system: Any, q: Floats, on: NDArray[np.bool_]) -> float:
         return 0.0
     H, h = (part[on] for part in system.constraint(q)[:2])
     G = H @ np.linalg.solve(system.mass_matrix(q), H.T)
-    return 0.5 * float(system.alpha[0, 0]) * float(h @ np.linalg.solve(G, h))
+    return 0.5 * float(system.alpha[0, 0]) * float(h @ np.linalg.lstsq(G, h, rcond=DEPENDENT)[0])
 
 
 def parted(run: Trajectory) -> bool:

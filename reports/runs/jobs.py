@@ -265,7 +265,7 @@ def _ran(
         run=run,
         clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled, cpu_s=took),
         audit=rows,
-        study=_study(ahead_of(case, known), pick, prepared, natural, run, took * part, OF_STUDIES * budget)
+        study=_study(ahead_of(case, known), pick, prepared, asked, natural, run, took * part, OF_STUDIES * budget)
         if studied
         else None,
         hidden=hidden,
@@ -338,19 +338,21 @@ def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Ma
 
 
 def _study(
-    case: Case, pick: Pick, prepared: Any, natural: Trajectory, judged: Trajectory, took: float, most: float
+    case: Case, pick: Pick, prepared: Any, given: Mapping[str, Value], natural: Trajectory, judged: Trajectory,
+    took: float, most: float,
 ) -> Study:  # fmt: skip
     """The other runs of an engine that tell the parts of its error; those of its model where its equations are known.
 
     They go as far as the case, which may end before the runs that are known: where its truth does. Where it reads the
-    file by itself they are of the model that is built from the scene.
+    file by itself they are of the model that is built from the scene. What was asked of the engine, they have too.
     """
     settings = prepared.settings
+    asked = {name: settings[name] for name in given if name in settings}
 
     def run(**changed: Any) -> Trajectory | str:
         limit = {"time_limit": STUDY_S} if "time_limit" in settings else {}
         try:
-            found: Trajectory = engines.load(pick.engine).prepare(case, pick.profile, **changed, **limit).run()
+            found: Trajectory = engines.load(pick.engine).prepare(case, pick.profile, **(asked | changed | limit)).run()
         except CaseUnsupported as error:
             return str(error)
         said = ", ".join(f"{name} {value}" for name, value in changed.items() if name != "samples")

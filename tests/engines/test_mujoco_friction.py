@@ -19,6 +19,8 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction.limits import Soft, creep
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.engines.equations import system_of
+from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.verdict import Word
 from crossbody.reports.runs import choice, jobs
 
 FILE = """<mujoco><option gravity="{gravity}" cone="{cone}" impratio="{impratio}" timestep="{dt}"/><worldbody>
@@ -203,3 +205,47 @@ def test_scenes_in_python_run_in_the_obvious_model(scene: Scene) -> None:
     assert found.outcome.ok, found.message
     assert abs(found.v[-1, 0]) < 0.02
     assert found.lam[-1, :8].sum() == pytest.approx(G * sum(body.mass for body in scene.bodies), rel=1e-3)
+
+
+SET = {"cone": ("pyramidal", "elliptic"), "impratio": (0.5, 1.0, 10.0, 100.0), "noslip": (0, 5, 50),
+       "timeconst": (0.005, 0.01, 0.03), "dt": (0.001, 0.002)}  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_importer_is_accused_of_settings(seed: int, tmp_path: Path) -> None:
+    """Every run that tells parts of an error has the settings that were asked: the readers agree to rounding."""
+    rng = np.random.default_rng(seed)
+    asked = {name: values[rng.integers(len(values))] for name, values in SET.items() if rng.random() < 0.6}
+    case = file(tmp_path, shape=BOX, mu=0.5, speed="1 .3 0 0 0 0.5")
+    case = cases.from_file(case.file, t_end=0.1)
+    found = jobs.run_case(case, choice.picks(["mujoco:as_is"]), settings=asked).entries[0]
+    assert found.study is not None
+    assert {name: found.settings[name] for name in asked} == asked
+    assert np.abs(found.study.built.q - found.run.q).max() < 1e-9
+
+
+@pytest.mark.parametrize("one", [{"cone": "elliptic"}, {"impratio": 100.0}, {"noslip": 50}, {"timeconst": 0.01}])
+def test_settings_of_friction_are_offered_where_a_file_has_some(one: dict[str, Any], tmp_path: Path) -> None:
+    """The scene has no rows for it before a run comes to some; MuJoCo has."""
+    path = file(tmp_path, shape=BOX).file
+    (name,) = one
+    assert name in engines.load("mujoco").offered(cases.from_file(path), "as_is")
+    assert engines.load("mujoco").prepare(cases.from_file(path), "as_is", **one).settings[name] == one[name]
+    smooth = path.replace(".xml", "2.xml")
+    Path(smooth).write_text(Path(path).read_text().replace("<geom ", '<geom condim="1" '))
+    assert name not in engines.load("mujoco").offered(cases.from_file(smooth), "as_is")
+
+
+@pytest.mark.parametrize("condim", [1, 3])
+def test_a_coefficient_of_zero_is_no_friction(condim: int, tmp_path: Path) -> None:
+    """Of a box at rest, whose corners share its weight, and of one that slides: rows and numbers as with condim 1."""
+    for speed in ("0 0 0 0 0 0", "1 0 0 0 0 0"):
+        soft = f'condim="{condim}"'
+        path = file(tmp_path, shape=BOX, mu=0, floor=soft, soft=soft, speed=speed).file
+        for rubs in (-1, 1):
+            case = cases.from_file(path, friction=rubs, t_end=0.1)
+            assert not any(" t" in name for name in case.contacts)
+            result = jobs.run_case(case, choice.picks(["reference:compiled"]))
+            words = [row.verdict for row in judged(result.case, result.entries, result.truth, "")]
+            assert not {Word.CRASHED, Word.OUTSIDE} & set(words)
+            assert result.entries[0].run.outcome.ok

@@ -19,6 +19,7 @@ from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint
 from crossbody.reference import simulate
 from crossbody.reports import metrics
+from crossbody.reports.judging.controls import unseen
 from crossbody.reports.measuring import friction
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.friction import rubbing
@@ -274,17 +275,32 @@ def test_what_sticks_to_a_belt_follows_the_law_over_the_belt(drift: float, monke
     assert measured("law_residual", run, case, from_run(run, Tier.A, "itself")) < 1e-9
 
 
-def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_path: Path) -> None:
-    """Both ends of a foot stick, which no forces keep in place at once; with mu = 1.9 one lets go that would jam."""
+def walker(name: str, folder: Path, t_end: float) -> Case:
+    """Return a robot that walks in a plane under random controls."""
     found = find_spec("gymnasium")
     if found is None or found.origin is None:
         pytest.skip("gymnasium is not installed")
-    path = Path(found.origin).parent / "envs" / "mujoco" / "assets" / "walker2d_v5.xml"
+    path = Path(found.origin).parent / "envs" / "mujoco" / "assets" / f"{name}.xml"
     times = 0.008 * np.arange(40)
     table = np.column_stack([times, np.random.default_rng(0).uniform(-1.0, 1.0, (125, 6))[:40]])
     names = ",".join(["t", *(actuator.name for actuator in cases.load(str(path)).scene.actuators)])
-    np.savetxt(tmp_path / "u.csv", table, delimiter=",", header=names, comments="", fmt="%.17g")
-    case = cases.load(str(path), ctrl=str(tmp_path / "u.csv"), t_end=0.3, friction=1)
+    np.savetxt(folder / "u.csv", table, delimiter=",", header=names, comments="", fmt="%.17g")
+    return cases.load(str(path), ctrl=str(folder / "u.csv"), t_end=t_end, friction=1)
+
+
+def test_an_end_of_a_foot_that_holds_while_the_other_slides_is_no_instant(tmp_path: Path) -> None:
+    """A pair holds when all its places do: a control that moves one of them in time is not one that is to be seen."""
+    case = walker("walker2d", tmp_path, t_end=0.25)
+    run = engines.load("reference").prepare(case, "compiled", samples=np.linspace(0.0, 0.25, 5001), rtol=1e-10).run()
+    last = [e for e in run.events if (e.before, e.after) == (Mode.SLIP, Mode.STICK)][-1]
+    mates = [k for k, name in enumerate(case.contacts) if name.startswith("floor:foot_left") and k != last.contact]
+    assert (run.mode[int(np.searchsorted(run.t, last.t)), mates] == Mode.SLIP).any()
+    assert list(unseen(case, from_run(run, Tier.A, "itself"), lambda name, value: True)) == []
+
+
+def test_a_foot_that_rocks_and_lets_go_at_its_bound_is_measured_by_its_law(tmp_path: Path) -> None:
+    """Both ends of a foot stick, which no forces keep in place at once; with mu = 1.9 one lets go that would jam."""
+    case = walker("walker2d_v5", tmp_path, t_end=0.3)
     run = engines.load("reference").prepare(case, "compiled").run()
     assert any(e.before == Mode.STICK and e.after == Mode.BALLISTIC for e in run.events)
     truth = from_run(run, Tier.D, "itself")
