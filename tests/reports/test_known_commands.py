@@ -23,6 +23,7 @@ from crossbody.reports.judging import known
 from crossbody.reports.maps import gapmap, known_maps, known_rules
 from crossbody.reports.pages import known_pictures
 from crossbody.reports.replay import known_doubts, known_fits, known_formats, known_replay
+from crossbody.reports.runs import output
 from crossbody.reports.suites.axis import Log
 from crossbody.reports.sweep import execute, known_sweep
 
@@ -33,7 +34,7 @@ COMMANDS = {
     "identify": ("identify", *LOG, "--free", "gravity", "--hold", "0", "--out", "out"),
     "bench": ("bench", "bouncing_ball", "--variant", "linear", "--repeats", "1", "-q", "--out", "out"),
     "analyse": ("analyse", "bouncing_ball", "--variant", "linear", "-q"),
-    "picture": ("picture", "none", "out"),
+    "picture": ("picture", "earlier", "out"),
     "stress": ("stress", "stiffness", "--runs", "1", "-q", "--out", "out"),
     "gapmap": ("gapmap", "--n", "2", "--points", "2", "-q", "--out", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
@@ -54,6 +55,8 @@ def test_what_is_right_is_not_told(name: str) -> None:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_ends_where_an_answer_is_wrong(name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
+    with output.folder(tmp_path / "earlier", "run"):
+        pass  # of which a picture is asked
     module = MODULES[{"bode": "analyse"}.get(name, name)]
     monkeypatch.setattr(module, "wrong", lambda: (("rmse", 1.0, (2.0, 2.0), "a log"),) * 2)
     ended = CliRunner().invoke(cli, COMMANDS[name])
