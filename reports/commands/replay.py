@@ -249,7 +249,7 @@ def _say_log(found: Comparison) -> None:
 
 def _say(found: Comparison, metrics: pd.DataFrame) -> None:
     told = metrics.assign(valid=list(map(layout.valid, metrics["expected"], metrics["limit"])))
-    click.echo(layout.told(f"{section.judged(told)} {section.explained(told)}") + "\n")
+    click.echo(layout.told(section.summary(told)) + "\n")
     _say_log(found)
     speed = metrics[metrics["metric"] == "speed"]
     metrics = metrics[metrics["metric"] != "speed"]

@@ -93,6 +93,7 @@ class Section:
     Attributes:
         name: its id on the page, of letters, digits and hyphens.
         title: heading.
+        says: what it comes to, in a sentence; below the heading of a page that it leads.
         text: what the reader must know to read it.
         plots, tables: shown below the text.
         template: file in reports/pages/templates; it may show more than the rest from `context`.
@@ -101,6 +102,7 @@ class Section:
 
     name: str
     title: str
+    says: str = ""
     text: str = ""
     plots: Sequence[Plot] = ()
     tables: Sequence[Table] = ()

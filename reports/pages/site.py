@@ -14,6 +14,7 @@ from jinja2 import TemplateError
 from crossbody.cases import OutputError
 from crossbody.reports import sections as studies
 from crossbody.reports.figures.section import Section
+from crossbody.reports.judging.told import WRONG
 from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
@@ -124,6 +125,9 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
             title = " · ".join(study.title for study in alone) if alone and not found.cases else page.title
             first = [section for study in alone for section in study.sections]
             page = replace(page, title=title, sections=[*first, *page.sections])
+            if led := [section.says for section in first if section.says]:
+                off = [page.lead] if any(row["verdict"] in WRONG for row in found.verdicts) else []
+                page = replace(page, lead=" ".join([*off, *led]), sections=[replace(s, says="") for s in page.sections])
         yield page
     if not alone:
         yield from studied

@@ -108,12 +108,13 @@ def _bench(out: Path) -> tuple[Section, ...]:
         Plot(name=f"work-precision-{i}", figure=work_precision(group))
         for i, (_, group) in enumerate(rows.groupby("case", sort=False))
     ]
-    text = words.BENCH_TEXT
+    says = ""
     if _has(out, "headline") and len(lead := _rows(out, "headline")):
         from crossbody.reports.bench.headline import summary
 
-        text = f"{summary(lead)} {text}"
-    return (Section(name="bench", title="Run time against error", text=text, plots=plots, tables=tables),)
+        says = summary(lead)
+    title = "Run time against error"
+    return (Section(name="bench", title=title, says=says, text=words.BENCH_TEXT, plots=plots, tables=tables),)
 
 
 def _conformance(out: Path) -> tuple[Section, ...]:
@@ -168,8 +169,8 @@ def _stress(out: Path) -> Iterator[Section]:
     from crossbody.reports.sweep.map import in_words
 
     table = _table("Runs by suite", words.SUITES, _rows(out, "stress_summary"), "stress")
-    text = f"{in_words(_rows(out, 'stress'))} {words.STRESS_TEXT}" if _has(out, "stress") else words.STRESS_TEXT
-    yield Section(name="stress", title="Stress runs by suite", text=text, tables=(table,))
+    says = in_words(_rows(out, "stress")) if _has(out, "stress") else ""
+    yield Section(name="stress", title="Stress runs by suite", says=says, text=words.STRESS_TEXT, tables=(table,))
     if len(cells := _rows(out, "stress_map")):
         from crossbody.reports.maps.figure import stress_map
 

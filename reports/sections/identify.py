@@ -54,7 +54,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     told = read_json(out / "identify.json")["provenance"]["fit"]
     windows = [len(told[name]) for name in ("fitted", "held")]
     how = f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."
-    text = " ".join([summary(estimates, held, *windows), *told["warnings"], how, OF_FIT])
+    text = " ".join([*told["warnings"], how, OF_FIT])
     estimates["identifiable"] = estimates["identifiable"].map({True: "yes", False: "no"})
     tables = (
         Table(title="Estimates", columns=ESTIMATES, rows=records(_only(estimates, ESTIMATES)), file="identify.csv"),
@@ -70,7 +70,8 @@ def sections(out: Path) -> tuple[Section, ...]:
         plots.append(Plot(name="identify-profile", figure=figure.profile(drawn["profile"], estimates)))
     if len(estimates) > 1 and len(drawn.get("correlation", ())):
         plots.append(Plot(name="identify-correlation", figure=figure.together(drawn["correlation"])))
-    first = Section(name="identify", title="Identified parameters", text=text, tables=tables)
+    says = summary(estimates, held, *windows)
+    first = Section(name="identify", title="Identified parameters", says=says, text=text, tables=tables)
     if not plots:
         return (first,)
     return (first, Section(name="identify-plots", title="How well they are determined", text=PROFILE, plots=plots))

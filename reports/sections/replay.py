@@ -81,11 +81,9 @@ def sections(out: Path) -> tuple[Section, ...]:
     plots += [Plot(name="replay-correlation", figure=figure.correlation(correlated))] if len(correlated) else []
     origin = "SYNTHETIC, no measurement" if about["synthetic"] else "a measurement"
     text = f"The log {about['file']} is {origin}{about['about'] and ': '}{about['about'].rstrip('.')}."
-    if not held:  # windows held out of a fit are judged with it, and where nothing is judged the page begins so
-        said = "" if metrics["limit"].isna().all() else f"{judged(metrics)} "
-        text = f"{said}{explained(metrics)} {text}"
+    says = "" if held else summary(metrics)  # windows held out of a fit are judged with it
     shown = [
-        Section(name="replay", title="Log and model", text=text, tables=tables(metrics)),
+        Section(name="replay", title="Log and model", says=says, text=text, tables=tables(metrics)),
         Section(name="replay-plots", title="Measured and predicted", text=TEXT, plots=plots),
     ]
     if len(found):
@@ -108,6 +106,12 @@ def tables(metrics: pd.DataFrame) -> tuple[Table, ...]:
     title = "Metrics that are not judged"
     more = Table(title=title, columns=plain, rows=records(rest), file="replay.csv", folded=True, once=True)
     return (*shown, more) if len(rest) else tuple(shown)
+
+
+def summary(metrics: pd.DataFrame) -> str:
+    """Say whether limits are met, if there are any, and how much of the motion is explained."""
+    said = [explained(metrics), judged(metrics)]
+    return " ".join(filter(None, said if metrics["limit"].isna().all() else said[::-1]))
 
 
 def explained(metrics: pd.DataFrame) -> str:

@@ -79,8 +79,8 @@ def test_replay_says_first_what_is_judged_and_how_far_off_every_engine_is(
     least = min(fits, key=fits.__getitem__)
     off = next(row["value"] for row in rows if (row["metric"], row["channel"]) == ("largest", least))
     met = sum(fit >= float(limit.partition("=")[2]) for fit in fits.values()) if limit else 0
-    assert said.startswith(f"{met} of {len(fits)} limits are met." if limit else "Nothing is judged, since no limit")
     explained = f"Explained least: {fits[least]:.3g} % of {least}, off by up to {off:.3g} rad (reference:compiled)."
+    assert said.startswith(f"{met} of {len(fits)} limits are met." if limit else explained)
     assert explained in said
     assert "Speed, in times of real time: reference:compiled" in said
     page = (out / "index.html").read_text(encoding="utf-8")

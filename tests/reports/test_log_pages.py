@@ -77,7 +77,7 @@ def test_a_limit_of_a_replay_is_said_as_it_was_asked_for(tmp_path: Path, capsys:
     assert valid == {"fit": "at least 99.5", "rmse": "at most 1e-06"}
     for words in valid.values():
         assert f"valid: {words}. Asked for by --limit." in " ".join(said.split())
-        assert f"({words})" in section.text
+        assert f"({words})" in section.says
 
 
 def test_what_is_judged_of_a_replay_comes_first_and_all_else_is_folded(tmp_path: Path) -> None:
