@@ -14,6 +14,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.scene_contacts import frictional
 from crossbody.reports import metrics
 from crossbody.reports.judging.truth import law_of, truth_of
+from crossbody.reports.measuring.cubics import coordinates, step_of
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs.choice import Pick
 
@@ -91,16 +92,10 @@ def hermite(run: Trajectory, grid: Floats) -> Trajectory:
 
     An instant that stands twice ends one cubic and begins another.
     """
-    last = np.clip(np.searchsorted(run.t, grid, side="right") - 1, 0, len(run.t) - 2)
-    last -= (run.t[last + 1] == run.t[last]) & (last > 0)
-    width = (run.t[last + 1] - run.t[last])[:, None]
-    s = np.divide(grid[:, None] - run.t[last][:, None], width, out=np.zeros_like(width), where=width > 0.0)
-    q0, q1 = run.q[last], run.q[last + 1]
-    v0, v1 = (run.v[at] * width if run.v.shape == run.q.shape else q1 - q0 for at in (last, last + 1))
-    q = q0 + s * (v0 + s * (3.0 * (q1 - q0) - 2.0 * v0 - v1 + s * (2.0 * (q0 - q1) + v0 + v1)))
+    last = step_of(run.t, grid)
     return replace(
-        run, t=grid, q=q, v=run.v[last], gap=run.gap[last], lam=run.lam[last], energy=run.energy[last],
-        mode=run.mode[last], ledger=None,
+        run, t=grid, q=coordinates(run, grid), v=run.v[last], gap=run.gap[last], lam=run.lam[last],
+        energy=run.energy[last], mode=run.mode[last], ledger=None,
     )  # fmt: skip
 
 

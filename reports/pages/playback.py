@@ -14,11 +14,11 @@ from crossbody.cases.arrays import Floats, distinct, quantiles
 from crossbody.reports import scenes
 from crossbody.reports.figures.section import Section
 from crossbody.reports.figures.styles import coded, label, style
+from crossbody.reports.measuring.cubics import coordinates
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.errors import told
 from crossbody.reports.pages.figures import carrying, few, normals
-from crossbody.reports.pages.filled import between
 from crossbody.reports.runs.store import Trace
 
 ROOM = 280_000  # room of the motions on a page, bytes
@@ -152,7 +152,7 @@ def _track(
 ) -> dict[str, Any]:  # fmt: skip
     run = trace.run
     t = distinct(np.clip(instants, run.t[0], run.t[-1]))
-    q = between(run, t, trace.quaternions)
+    q = coordinates(run, t, trace.quaternions)
     lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t, side="right"), 1))
     poses, arrows = scene.poses(q, parameters), scene.arrows(q, lam, parameters)[:, pushing]
     look = style(trace)
