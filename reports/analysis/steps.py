@@ -30,7 +30,7 @@ def largest_step(place: Place) -> tuple[float, str]:
 
     Infinite, and no state, where none does; 0 where it is stable at no step.
     """
-    model, drag = place.linearised(reduce=place.held), np.zeros((0, 0))
+    model = place.linearised(reduce=place.held)
     moves = [k for k, state in enumerate(model.states) if state.endswith("'")]
     drag = _drag(place, model, moves)
     poles = model.poles()

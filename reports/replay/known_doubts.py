@@ -24,6 +24,7 @@ from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation, st
 from crossbody.hw.windows.window import recorded_inputs
 from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.replay import known_replay as known
+from crossbody.reports.replay.known_fits import flight
 
 EXACT, DRAWN = 1e-9, 0.25
 """By which part sums in another order differ; and what deviations of so few draws are known to."""
@@ -103,11 +104,7 @@ def _channels() -> Iterator[Within]:
 @cache
 def _log() -> hw.Log:
     """Return the log of a ball in flight."""
-    t = known.STEP * np.arange(65)
-    noise = known.NOISE * np.random.default_rng(8).normal(size=len(t))
-    heights = 3.0 + 4.0 * t - 0.5 * known.G * t**2 + noise
-    text = "\n".join(["t,h", *(f"{a!r},{1e3 * b!r}" for a, b in zip(t.tolist(), heights.tolist(), strict=True))])
-    return known.read(text, known.BALL.replace(f"delay = {known.DELAY}", ""))
+    return flight()[2]
 
 
 @cache

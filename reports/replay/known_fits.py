@@ -56,13 +56,19 @@ def _told(name: str, what: str, found: Estimate, wanted: tuple[float, float, flo
         yield f"interval of {name}", what, end, value + sign * half, 2.0 * part * half
 
 
-def _ball() -> Iterator[Within]:
-    """Yield gravity from a flight of known start, its derivative, interval and profile: no part of it is curved."""
-    t = known.STEP * np.arange(round(FLIES / known.STEP) + 1)
-    noise = known.NOISE * np.random.default_rng(8).normal(size=len(t)) * (np.arange(len(t)) > STILL)
+def flight(still: int = -1) -> tuple[Floats, Floats, hw.Log]:
+    """Return instants, s, noisy heights, m, and the log of a ball in flight, up to a sample without noise."""
+    t = known.STEP * np.arange(round(FLIES / known.STEP) + 1, dtype=np.float64)
+    noise = known.NOISE * np.random.default_rng(8).normal(size=len(t)) * (np.arange(len(t)) > still)
     heights = HEIGHT + SPEED * t - 0.5 * known.G * t**2 + noise
     text = "\n".join(["t,h", *(f"{a!r},{1e3 * b!r}" for a, b in zip(t.tolist(), heights.tolist(), strict=True))])
-    log, model = known.read(text, known.BALL.replace(f"delay = {known.DELAY}", "")), hw.models.load("ball")
+    return t, heights, known.read(text, known.BALL.replace(f"delay = {known.DELAY}", ""))
+
+
+def _ball() -> Iterator[Within]:
+    """Yield gravity from a flight of known start, its derivative, interval and profile: no part of it is curved."""
+    t, heights, log = flight(STILL)
+    model = hw.models.load("ball")
     (cut,) = windows(log, model, 0.0)
     (height,), (speed,) = cut.segment.y, cut.segment.yd
     told = "a flight of a ball"
