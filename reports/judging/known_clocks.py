@@ -17,15 +17,14 @@ import numpy as np
 
 from crossbody.cases import Outcome, Trajectory
 from crossbody.engines.contract import Run
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.clocks import CORES, TICK, Clock, mistimed
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.reach import estimated
 
 SPIN, PART = 2e-3, 0.25
 """For how long a run counts, s, and what part of another one it is."""
 AROUND, TOOK, STEPS = 2.0, 3.0, 1000
 """Of a run: what passed around it, and what all took, s; and its steps."""
-Found = tuple[str, float, Range, str]
 
 
 @cache

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -23,8 +23,8 @@ from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, Mode, Trajectory, Value
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
-from crossbody.reports.judging.asked import Found, rows_of
-from crossbody.reports.judging.known_engines import OTHERS
+from crossbody.reports.judging.asked import Found
+from crossbody.reports.judging.known_engines import asked_of
 
 GAP, ZETA, A0, MASSES, SPEED = 0.02, 0.3, 4e4, (0.4, 0.3), 1.3
 """Of two bodies that meet: m, damping ratio, 1/s^2, kg, and of the first, m/s."""
@@ -53,17 +53,10 @@ def wrong(name: str) -> tuple[Found, ...]:
     Args:
         name: of one of crossbody's own engines, which is installed.
     """
-    own = engines.load(name)
-
-    def failed(why: str) -> Found:
-        return name, math.nan, (0.0, 0.0), f"a contact in closed form, which ends in {why}"
-
-    profiles = [profile for profile in own.profiles if profile not in OTHERS]
-    asks = (_parts, _slides, _approximates)
-    return tuple(found for profile in profiles for ask in asks for found in rows_of(partial(ask, own, profile), failed))
+    return asked_of(name, _parts, _slides, _approximates)
 
 
-def run_of(engine: engines.Engine, profile: str, case: Case, **asked: Value) -> tuple[Trajectory, engines.Run] | None:
+def ran(engine: engines.Engine, profile: str, case: Case, **asked: Value) -> tuple[Trajectory, engines.Run] | None:
     """Return a motion with those of the settings that a profile has, and its run; None of what it cannot do."""
     try:
         offered = engine.offered(case, profile)
@@ -92,7 +85,7 @@ def _parts(engine: engines.Engine, profile: str) -> Iterator[Found]:
         collisions="resolved",
     )  # fmt: skip
     case = replace(case, t_end=end, closed_form=None, claims=(), limits=())
-    if (found := run_of(engine, profile, case, dt=lasts / FINE)) is None:
+    if (found := ran(engine, profile, case, dt=lasts / FINE)) is None:
         return
     run, prepared = found
     told = prepared.audit().get("constants") or {}
@@ -148,7 +141,7 @@ def _on_a_floor(push: float, fast: float, t_end: float) -> Case:
 def _slides(engine: engines.Engine, profile: str) -> Iterator[Found]:
     """Ask for a slide and its stop: speeds, the way, and friction over what presses."""
     stops = FAST / (MU * G)
-    if profile in DEAR or (found := run_of(engine, profile, _on_a_floor(0.0, FAST, 1.4 * stops), dt=STEP)) is None:
+    if profile in DEAR or (found := ran(engine, profile, _on_a_floor(0.0, FAST, 1.4 * stops), dt=STEP)) is None:
         return
     run, _ = found
     off = STEPS_OFF * STEP / stops if "dt" in engine.offered(_on_a_floor(0.0, FAST, stops), profile) else EXACT
@@ -174,7 +167,7 @@ def _approximates(engine: engines.Engine, profile: str) -> Iterator[Found]:
     except (CaseUnsupported, KeyError):
         return
     for choice in map(str, choices):
-        runs = [run_of(engine, profile, case, approximation=choice, stiction=SLOW, dt=STEP) for case in (slide, creep)]
+        runs = [ran(engine, profile, case, approximation=choice, stiction=SLOW, dt=STEP) for case in (slide, creep)]
         glided, crept = (found[0] for found in runs if found is not None)
         size = MU * FAST
         wanted = {

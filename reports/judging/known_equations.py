@@ -9,7 +9,7 @@ Motions are drawn at random: they obey no law, so each number is one that no oth
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -18,8 +18,8 @@ import numpy as np
 from crossbody import cases
 from crossbody.cases import Case, Event, Ledger, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.reports.judging.asked import Asked, Found, unlike_by
 from crossbody.reports.judging.known_answers import measured
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.measuring.truth import Truth
 
 EXACT = 1e-9
@@ -29,27 +29,15 @@ MASSES, GAP, A0 = (0.4, 0.3, 0.2), 1e-3, 2e6
 """Of sliders: kg, m and 1/s^2."""
 ZETA = 0.03
 """Damping ratio of sliders whose law is asked for."""
-Found = tuple[str, float, Range, str]
-Number = tuple[str, str, float, float]
-"""A metric, of what, its number, and what it must be."""
 
 
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return metric, number, least and most, and of what, where it is another one."""
-    return unlike((*_sliders(), *_residuals()))
+    return unlike_by((_sliders, _residuals), "equations", "sliders, which end in", EXACT, 0.0)
 
 
-def unlike(numbers: Iterable[Number]) -> tuple[Found, ...]:
-    """Return those numbers that are others than they must be, as `wrong` does."""
-    return tuple(
-        (name, found, (wanted, wanted), what)
-        for name, what, found, wanted in numbers
-        if not abs(found - wanted) <= EXACT * abs(wanted)
-    )
-
-
-def said(names: dict[str, float], what: str, runs: tuple[Trajectory, Trajectory], case: Case) -> Iterator[Number]:
+def said(names: dict[str, float], what: str, runs: tuple[Trajectory, Trajectory], case: Case) -> Iterator[Asked]:
     """Yield metric, of what, what it says of the second of two motions beside the first, and what it must."""
     truth = Truth(
         tier=Tier.A, source="made up", trajectory=runs[0], at=lambda t: replace(runs[0], t=t), agreement={},
@@ -65,7 +53,7 @@ def _case(**more: float) -> Case:
     return cases.load("newtons_cradle", "sliders", n=3, gap=GAP, a0=A0, collisions="resolved", masses=masses, **more)
 
 
-def _sliders() -> Iterator[Number]:
+def _sliders() -> Iterator[Asked]:
     """Yield what rows that are switched on and off, one and both, make of energy by what their springs hold."""
     case = _case()
     draw, t = np.random.default_rng(SEED), np.linspace(0.0, 1.0, SAMPLES)
@@ -111,7 +99,7 @@ def _below(case: Case, deep: int, t: Floats) -> tuple[tuple[Trajectory, Trajecto
     return (run, run), case
 
 
-def _residuals() -> Iterator[Number]:
+def _residuals() -> Iterator[Asked]:
     """Yield how far energies, gaps and multipliers of a motion are from those of its states, both rows in contact."""
     case, draw = _case(zeta=ZETA), np.random.default_rng(SEED)
     q, v, lam = (

@@ -21,7 +21,7 @@ import numpy as np
 from crossbody import cases
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
-from crossbody.reports.judging.asked import rows_of
+from crossbody.reports.judging.asked import Found, rows_of
 from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.start_of_file import start_of_file
 
@@ -59,7 +59,6 @@ STARTS = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0
 <keyframe><key name="one" qpos=".3" qvel="-2" ctrl=".7"/></keyframe></mujoco>"""
 OTHER = 1e-6
 """By which another start is off."""
-Found = tuple[str, float, Range, str]
 Asked = tuple[str, Any, Any]
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -20,10 +20,10 @@ from crossbody import engines
 from crossbody.cases import Case
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
-from crossbody.reports.judging.asked import Found, rows_of
-from crossbody.reports.judging.known_contacts import DEAR, EXACT, run_of
+from crossbody.reports.judging.asked import Found
+from crossbody.reports.judging.known_contacts import DEAR, EXACT, ran
 from crossbody.reports.judging.known_drives import FIT
-from crossbody.reports.judging.known_engines import OTHERS
+from crossbody.reports.judging.known_engines import asked_of
 
 MASS, A, C, G = 0.7, 0.02, 0.031, 9.81
 """Of a top: kg, kg m^2, and m/s^2."""
@@ -40,14 +40,7 @@ def wrong(name: str) -> tuple[Found, ...]:
     Args:
         name: of one of crossbody's own engines, which is installed.
     """
-    own = engines.load(name)
-
-    def failed(why: str) -> Found:
-        return name, math.nan, (0.0, 0.0), f"a flight in closed form, which ends in {why}"
-
-    profiles = [profile for profile in own.profiles if profile not in OTHERS]
-    asked = [(profile, floor) for profile in profiles for floor in (False, True) if not (floor and profile in DEAR)]
-    return tuple(found for profile, floor in asked for found in rows_of(partial(_flies, own, profile, floor), failed))
+    return asked_of(name, _floats, _flies)
 
 
 def _top(floor: bool) -> Case:
@@ -64,9 +57,17 @@ def _top(floor: bool) -> Case:
     return case_of(scene, name="flies", q0=[*PLACE, *TURN], v0=[*RATES, *SPIN], t_end=LASTS)
 
 
-def _flies(engine: engines.Engine, profile: str, floor: bool) -> Iterator[Found]:
-    case = _top(floor)
-    if (found := run_of(engine, profile, case, dt=STEP, rtol=FIT)) is None:
+def _floats(engine: engines.Engine, profile: str) -> Iterator[Found]:
+    return _turns(engine, profile, _top(floor=False))
+
+
+def _flies(engine: engines.Engine, profile: str) -> Iterator[Found]:
+    if profile not in DEAR:
+        yield from _turns(engine, profile, _top(floor=True))
+
+
+def _turns(engine: engines.Engine, profile: str, case: Case) -> Iterator[Found]:
+    if (found := ran(engine, profile, case, dt=STEP, rtol=FIT)) is None:
         return
     q, v = found[0].q[-1], found[0].v[-1]
     exact = engine.orders.get(profile, 1.0) > 1.0 or "rtol" in engine.offered(case, profile)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from crossbody.cases.defaults import shortest
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.truth import grown
 
 SAME = 1e-9
@@ -16,7 +16,6 @@ SHORT, BRIEF = 1e-6, 0.1
 """By how much instants may be off, s, and the horizon below which it is as much of that less, s."""
 HORIZONS, RATES, OFF = (1e-3, 0.7, 90.0), (0.3, 2.0, 9.0), 3e-5
 """Horizons, s, growth rates over them, and by what a start is off."""
-Found = tuple[str, float, Range, str]
 
 
 @cache

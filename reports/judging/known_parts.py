@@ -14,10 +14,10 @@ import numpy as np
 
 from crossbody.cases import Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.known_answers import UNLIKE
 from crossbody.reports.judging.made_up import MadeUp, case_of
 from crossbody.reports.judging.parts import Split, Study, part_of, remaining, splits
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.measuring.truth import Truth
 
 SEED, ORDER, STEPS = 5, 1.5, (0.4, 0.2, 0.1)
@@ -25,7 +25,6 @@ NEAR = 1e-3
 """Part of its size by which a coordinate is off: less than by what another clock makes of it."""
 SAME = 1e-9
 """Part of the largest that rounding changes of any."""
-Found = tuple[str, float, Range, str]
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,9 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.engines.equations import equations_of
-from crossbody.reports.judging import asked, known_equations
-from crossbody.reports.judging.asked import Found, Within
+from crossbody.reports.judging.asked import Asked, Found, Within, unlike, unlike_by
 from crossbody.reports.judging.forces_of_scene import forces_against
-from crossbody.reports.judging.known_equations import SAMPLES, SEED, Number, said
+from crossbody.reports.judging.known_equations import EXACT, SAMPLES, SEED, said
 
 MASS, GRAVITY, RADIUS, MU = 1.7, 9.81, 0.2, 0.37
 LAW = RowLaw(a0=3e3, a1=40.0)
@@ -34,7 +33,10 @@ LITTLE = 1e-6
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return metric or audit, number, least and most, and of what, where it is another one."""
-    return (*known_equations.unlike(_ball()), *asked.unlike((_forces,), "audit", "an engine, which ends in"))
+    return (
+        *unlike_by((_ball,), "equations", "a ball, which ends in", EXACT, 0.0),
+        *unlike((_forces,), "audit", "an engine, which ends in"),
+    )
 
 
 def _floor() -> Case:
@@ -64,7 +66,7 @@ def _motion(seed: int) -> Trajectory:
     )  # fmt: skip
 
 
-def _ball() -> Iterator[Number]:
+def _ball() -> Iterator[Asked]:
     truth, run = _motion(SEED), replace(_motion(SEED + 1), t=_motion(SEED).t)
     normal, force, slip = run.lam[:, 0], run.lam[:, 1:], run.v[:, :2]
     size, speed = (np.sqrt((one**2).sum(axis=1)) for one in (force, slip))

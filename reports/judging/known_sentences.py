@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.verdict import Row, Verdict, Word
 
@@ -21,7 +21,6 @@ METRICS = ("position", "velocity", "energy_drift", "balls_out", "gap_residual")
 """Of which the first is told before all others, and the last two are no quantities of a motion."""
 QUANTITIES, NAMED = 3, 3
 """How many of these are, and how many runs are named."""
-Found = tuple[str, float, Range, str]
 KINDS = ("largest deviation", "off", "beyond a limit")
 WORDS = (Word.EXPECTED, Word.OUTSIDE, Word.INFO)
 

@@ -11,8 +11,8 @@ import numpy as np
 from crossbody.cases import Event, Mode, Switch, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.made_up import case_of
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.measuring.truth import from_run
 
 TOUCH, END = 0.2, 1.0
@@ -22,7 +22,6 @@ LEFT, DEEP, SAME = 0.3, 0.4, 1e-6
 """Force that a row lets go of, of 1 N, its gap there, of ways of 1 m, and part by which an answer may differ."""
 SWITCHES = "lets go as something switches"
 """What a row does whose force may jump through zero."""
-Found = tuple[str, float, Range, str]
 
 
 @cache

@@ -10,8 +10,8 @@ import numpy as np
 
 from crossbody.cases import Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.made_up import case_of
-from crossbody.reports.judging.planted import Range
 from crossbody.reports.judging.truth import PARTED, agreement, held_against
 from crossbody.reports.measuring.truth import from_run
 
@@ -23,7 +23,6 @@ ROUNDED, CLOSE, TOLERANCE = 1e-13, 1e-6, 1e-12
 """What two motions are apart by at first, part by which an answer may differ, and the tolerance of both sources."""
 RATES = (17.0, 23.0)
 """Of two motions that part, over the horizon."""
-Found = tuple[str, float, Range, str]
 
 
 @cache

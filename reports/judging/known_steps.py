@@ -26,7 +26,7 @@ from crossbody.cases.case import Law
 from crossbody.engines.equations import module
 from crossbody.reference import Options, System, prepare, simulate
 from crossbody.reference.core.layout import DONE, IMPLICIT, MORE
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found
 
 MASS, GRAVITY, SAMPLES = 2.0, 9.81, 62
 FEW, MANY, OF_WORK = 10.0, 100.0, 1e3
@@ -38,7 +38,6 @@ UNLIKE = 1.5
 """By what factor steps may become more than the order says, or fewer: first steps, and those that are cut short."""
 MOST = 1000  # steps of any of these
 LEAST = 1e-12  # what rounding leaves of any error
-Found = tuple[str, float, Range, str]
 
 
 @cache

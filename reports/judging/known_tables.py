@@ -17,7 +17,7 @@ import numpy as np
 
 from crossbody.cases.arrays import Floats
 from crossbody.reference.core import bogacki, dop853_table, esdirk
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found
 
 ROUNDED = 1e-14
 """What sums of coefficients of some tens, given to 16 digits, may be off by."""
@@ -34,7 +34,6 @@ ESTIMATES: tuple[tuple[str, Floats, Floats, int], ...] = (
     ("explicit", dop853_table.E3, dop853_table.C[: STAGES + 1], 3),
     ("implicit", esdirk.E, esdirk.C, 3), ("between ticks", bogacki._E, bogacki.C, 2),
 )  # fmt: skip
-Found = tuple[str, float, Range, str]
 
 
 @cache

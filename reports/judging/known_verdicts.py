@@ -11,7 +11,7 @@ from functools import cache
 
 from crossbody.cases import Claim, Limit, Tier
 from crossbody.reports.judging import verdict
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.judging.verdict import Word, as_stored, band, judge, regression
 
 BESIDE = 1e-3
@@ -20,7 +20,6 @@ LIMIT, STORED, EXPECTED = 1e-6, 3e-3, 4.0
 FACTOR, AGAIN, BAND, ROUNDING, NOUGHT = 2.0, 1.05, 10.0, 1e-12, 1e-6
 """As docs/explanation/verdicts.md has them: of known sizes, also of the same version's on the same grid, of bands, of
 what differs between machines, of no limit."""
-Found = tuple[str, float, Range, str]
 Asked = tuple[str, str, str]
 
 

@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.pages import known_figures, known_playback, known_texts
 from crossbody.reports.pages.made_up_traces import Said
 
 SHOWN, ROUNDED = 2e-4, 1e-6
 """Part of a number that a logarithmic axis does not show, and of the largest that single precision does not."""
-Found = tuple[str, float, Range, str]
 
 
 @cache

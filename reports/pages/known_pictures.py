@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 
 from crossbody.cases import Trajectory
+from crossbody.reports.judging.asked import Found
 from crossbody.reports.pages import picture
 from crossbody.reports.pages.known_figures import drawn
-from crossbody.reports.pages.known_pages import Found, asked
+from crossbody.reports.pages.known_pages import asked
 from crossbody.reports.pages.made_up_traces import Said
 from crossbody.reports.runs.store import Trace
 
