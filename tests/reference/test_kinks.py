@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from friction_scenes import ON_TOP, RIDES, ball_on_solid
 from random_scenes import random_scene, random_state
 
 from crossbody.cases import Control, Law, Outcome
-from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape, Tendon
+from crossbody.cases.scene import Actuator, Body, Joint, Scene, Tendon
 from crossbody.cases.scene_contacts import rows_of
 from crossbody.reference import System, simulate
 from crossbody.reference.linear import linearise, sensitivity
@@ -186,29 +187,10 @@ def test_derivatives_go_through_a_clamp() -> None:
         assert np.abs(linearise(one, [q]).A - [[0.0, 1.0], [-stiffness, -0.5 * (stiffness > 0.0)]]).max() <= 1e-12
 
 
-RIDES = {
-    "box": ("box", (0.3, 0.5, 0.1), 0.1),
-    "capsule": ("capsule", (0.1, 0.3, 0.0), 0.1),
-    "cylinder": ("cylinder", (0.3, 0.1, 0.0), 0.1),
-}
-
-
 @pytest.mark.parametrize("name", RIDES)
 def test_a_ball_goes_over_the_end_of_a_face_at_an_instant(name: str) -> None:
     """The gap's curvature jumps where the nearest point comes to an edge, and with it what presses."""
-    kind, size, top = RIDES[name]
-    lying = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0) if kind == "capsule" else (1.0, 0.0, 0.0, 0.0)
-    ball = Body(name="ball", mass=1.0, inertia=(1e-3,) * 3 + (0.0,) * 3)
-    rails = tuple(Joint(name=name, body="ball", type="slide", axis=axis)
-                  for name, axis in (("x", (1.0, 0.0, 0.0)), ("z", (0.0, 0.0, 1.0))))  # fmt: skip
-    scene = Scene(
-        bodies=(ball,), joints=rails,
-        shapes=(Shape(name="solid", type=kind, size=size, orientation=lying),
-                Shape(name="round", body="ball", type="sphere", size=(0.1, 0.0, 0.0))),
-        pairs=(Pair(name="touch", first="solid", second="round", law=RowLaw(a0=4e4, a1=400.0)),),
-        gravity=(0.0, 0.0, -9.81),
-    )  # fmt: skip
-    one, q0, v0 = made(scene), [0.0, top + 0.1], [0.6, 0.0]
+    one, q0, v0 = made(ball_on_solid(name)), [*ON_TOP], [0.6, 0.0]
     fine = simulate(across(one), q0, v0, 0.7, rtol=1e-13, max_step=1e-4)
     runs = [simulate(one, q0, v0, 0.7, rtol=1e-10, solver=solver) for solver in ("compiled", "cvode")]
     for run in runs:

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from friction_scenes import G, box_on_floor, point, sphere_on_floor
+from friction_scenes import ON_TOP, RIDES, G, ball_on_solid, box_on_floor, point, sphere_on_floor
 
 from crossbody.cases import Mode, Outcome
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.reference import System, kernels, simulate
 from crossbody.reference.linear import Sensitivity, sensitivity
 from crossbody.reference.linear.differences import differences
@@ -20,7 +19,6 @@ from crossbody.reference.tree.system import system
 
 ALPHA = float(np.arctan(0.4))
 GROWS = 3.0  # N/s
-RIDES = {"box": (0.3, 0.5, 0.1), "capsule": (0.1, 0.3, 0.0), "cylinder": (0.3, 0.1, 0.0)}
 
 
 def ends(one: System, q: Any, v: Any, t_end: float, solver: str = "cvode") -> np.ndarray:
@@ -38,29 +36,12 @@ def agree(found: Sensitivity, end: Any, q: Any, v: Any, steps: tuple[float, ...]
     assert np.abs(found.by_start - best).max() <= close * max(np.abs(best).max(), 1.0)
 
 
-def riding(kind: str, size: tuple[float, ...], mu: float = 0.0) -> tuple[System, list[float]]:
-    """Return a ball on a solid, in a plane, and where it stands on top: behind an end the gap is curved."""
-    lying = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0) if kind == "capsule" else (1.0, 0.0, 0.0, 0.0)
-    ball = Body(name="ball", mass=1.0, inertia=(1e-3,) * 3 + (0.0,) * 3)
-    rails = tuple(Joint(name=name, body="ball", type="slide", axis=axis)
-                  for name, axis in (("x", (1.0, 0.0, 0.0)), ("z", (0.0, 0.0, 1.0))))  # fmt: skip
-    scene = Scene(
-        bodies=(ball,), joints=rails,
-        shapes=(Shape(name="solid", type=kind, size=size, orientation=lying),
-                Shape(name="round", body="ball", type="sphere", size=(0.1, 0.0, 0.0))),
-        pairs=(Pair(name="touch", first="solid", second="round", law=RowLaw(a0=4e4, a1=400.0),
-                    friction=(mu, mu, 0.0, 0.0, 0.0), dimension=3 if mu else 1),),
-        gravity=(0.0, 0.0, -G),
-    )  # fmt: skip
-    return system(scene, case_of(scene).law), [0.0, 0.2]
-
-
 @pytest.mark.parametrize("name", RIDES)
 @pytest.mark.parametrize("mu", [0.0, 0.05])
 def test_the_curvature_of_a_gap_jumps_at_the_end_of_a_face(name: str, mu: float) -> None:
     """With it the acceleration: a ball that comes there later falls later."""
-    one, q = riding(name, RIDES[name], mu)
-    v = [0.8, 0.0]
+    scene, q, v = ball_on_solid(name, mu), [*ON_TOP], [0.8, 0.0]
+    one = system(scene, case_of(scene).law)
     found = sensitivity(one, q, v, 0.5)
     assert any(switch.t > 0.1 for switch in found.run.switches)
     solver = "compiled" if mu else "cvode"  # which takes a minute for each such difference with friction

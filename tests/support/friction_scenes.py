@@ -344,3 +344,23 @@ def account(run: Trajectory) -> float:
     assert run.ledger is not None
     done = run.ledger.contact.sum(axis=1) + run.ledger.input - run.ledger.dissipated
     return float(np.abs(run.total_energy - run.total_energy[0] - done).max())
+
+
+RIDES = {"box": (0.3, 0.5, 0.1), "capsule": (0.1, 0.3, 0.0), "cylinder": (0.3, 0.1, 0.0)}
+ON_TOP = (0.0, 0.2)
+"""Where a ball stands on top of these solids."""
+
+
+def ball_on_solid(kind: str, mu: float = 0.0) -> Scene:
+    """A ball on a solid, in a plane: behind an end of its face the gap is curved."""
+    lying = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0) if kind == "capsule" else (1.0, 0.0, 0.0, 0.0)
+    rails = tuple(Joint(name=name, body="ball", type="slide", axis=axis)
+                  for name, axis in (("x", (1.0, 0.0, 0.0)), ("z", (0.0, 0.0, 1.0))))  # fmt: skip
+    return Scene(
+        bodies=(Body(name="ball", mass=1.0, inertia=(1e-3,) * 3 + (0.0,) * 3),), joints=rails,
+        shapes=(Shape(name="solid", type=kind, size=RIDES[kind], orientation=lying),
+                Shape(name="round", body="ball", type="sphere", size=(0.1, 0.0, 0.0))),
+        pairs=(Pair(name="touch", first="solid", second="round", law=RowLaw(a0=4e4, a1=400.0),
+                    friction=(mu, mu, 0.0, 0.0, 0.0), dimension=3 if mu else 1),),
+        gravity=(0.0, 0.0, -G),
+    )  # fmt: skip
