@@ -13,8 +13,8 @@ equal time since it. At every sample
 The converged motion is the truth of the equations that the engine follows, where those are known;
 else it follows from three steps or more, each half of the one before, by the order that they
 show. Without one nothing is extrapolated: it is the finest run, known to what further differences
-sum to where they fall, else it is not known. Of an engine with a tolerance instead of a step it
-is the run at the tightest. What a part is known to stands beside it.
+sum to at most where those of the finest runs fall, else it is not known. Of an engine with a
+tolerance instead of a step it is the run at the tightest. What a part is known to stands beside it.
 """
 
 from __future__ import annotations
@@ -39,8 +39,10 @@ PARTS = ("importer", "model", "step")
 SPLIT = ("position", "event_times")  # metrics whose error is split
 RATIO = 2.0  # of one step of a study to the next
 FLAT = 1e-10  # differences of runs below it, relative, are rounding that has added up: they show no order
-LEAST_RATIO = 2.0**0.5
-"""Of the differences of neighbouring steps: with less, half an order, nothing can be predicted."""
+LEAST_RATIO, FALLEN = 2.0**0.5, (3, 5)
+"""Of the differences of neighbouring steps: with less, half an order, nothing can be predicted; and how many of the
+finest tell how they fall where they show no order, at least and at most."""
+SETTLED = 0.05  # part of the largest error to which finer steps must not change it
 UNLIKE = 0.3  # part of the differences that may be other than a power of the step (root of the mean square)
 ROUNDING = 1e-12  # what runs of two models that are the same to rounding may differ by, relative or s
 SAMPLES = 2000  # samples at which runs are compared
@@ -162,7 +164,7 @@ def _step(
     except NotMeasuredError as why:
         if math.isnan(rest := remaining(errors)):
             raise
-        falling = f"but each is at least {LEAST_RATIO:.2f} times the next: if this continues, they sum to {rest:.1e}."
+        falling = f"but on the whole they fall: if they go on to, they sum to {rest:.1e} at most."
         return here - errors[-1], rest, f"{str(why).removesuffix('.')}; {falling}"
     limit, known = extrapolated(errors[-3:], ratio)
     if math.isinf(ratio):
@@ -203,17 +205,51 @@ def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, S
 
 
 def remaining(errors: Sequence[Floats]) -> float:
-    """Return what all further differences sum to if each falls as those of the runs do; NaN where these do not fall.
+    """Return what all further differences sum to at most, if they go on to fall; NaN where those of the runs do not.
 
-    Events that a step rounds to its own instants leave differences that fall with the step and
-    are no power of it.
+    Events that a step rounds to its own instants leave differences that fall with the step, but neither as
+    a power of it nor each below the one before. The finest must fall by `LEAST_RATIO` on the whole (by a
+    line through their logarithms, least squares), and no faster fall is counted on: each allows the last
+    what it would have fallen to, and the largest of these bounds what follows.
 
     Args:
         errors: of four runs or more (samples, components), the coarsest first; of fewer it is NaN.
     """
-    sizes = [_most(one - other) for one, other in pairwise(errors)]
-    falling = len(sizes) > 2 and all(one >= LEAST_RATIO * other for one, other in pairwise(sizes))
-    return sizes[-1] / (LEAST_RATIO - 1.0) if falling else math.nan
+    least, most = FALLEN
+    sizes = np.array([_most(one - other) for one, other in pairwise(errors)])[-most:]
+    if len(sizes) < least or not np.isfinite(sizes).all():
+        return math.nan
+    age = np.arange(len(sizes))[::-1]
+    fall = np.polyfit(age, np.log(np.maximum(sizes, np.finfo(float).tiny)), 1)[0]
+    if fall < math.log(LEAST_RATIO):
+        return math.nan
+    return float(np.max(sizes / LEAST_RATIO**age)) / (LEAST_RATIO - 1.0)
+
+
+def settled(case: Case, truth: Truth, run: Trajectory, study: Study) -> bool:
+    """Return whether finer steps than those of a study would tell little more of the parts of an error.
+
+    They show an order, or what follows is a small part (`SETTLED`) of the whole error.
+
+    Args:
+        case: what was run.
+        truth: what the whole error is measured against.
+        run: the engine as it was judged.
+        study: its runs at falling steps.
+    """
+    positions = Positions(case, truth, truth.compared(run))
+    if not positions.whole.size:
+        return True
+    positions.expect(study.runs)
+    try:
+        errors = [positions(one) for one in study.runs]
+    except NotMeasuredError:  # one ends too early, and finer ones would too
+        return True
+    try:
+        observed(errors, study.sizes)
+    except NotMeasuredError:
+        return remaining(errors) <= SETTLED * _most(positions.whole)
+    return True
 
 
 def _listed(sizes: Sequence[float]) -> str:

@@ -25,27 +25,16 @@ from crossbody.reports.judging.comparison import check_names, judges_parts
 from crossbody.reports.judging.covered import covered
 from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.forces_of_scene import forces_of_scene
-from crossbody.reports.judging.parts import RATIO, Study
 from crossbody.reports.judging.reach import BUDGET, estimated, followed
 from crossbody.reports.judging.run_verdicts import Entry, crash
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.choice import Pick, check_known, of_case, of_pick, offered
+from crossbody.reports.runs.refined import refined
 
-FINEST_TOLERANCE = 1e-12
-LOOSER = 10.0
-"""A tolerance of a study over the tightest: what their runs differ by tells the tightest's error."""
-MANY_STEPS, HALVINGS, LEAST_SIZES = 10_000, 5, 3
-"""A step is halved twice for its study, and up to five times while that takes no more steps; a run
-that has more by itself is studied at twice and four times its step. An order needs three of them."""
 TRUTHS = 3.0  # a truth may take so many times as long as a run: it is two of them, at tight tolerances
 ENOUGH = 2000  # steps of a run that is drawn as it is
-STUDY_S = 20.0
-"""Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
-OF_STUDIES, DEARER = 2.0, 3.0
-"""Time that all runs of a study of a scene may take, in budgets, by what its own run took; one at
-a tight tolerance is taken to cost so many times as much."""
 FIRST, DEAR = 0.02, 4.0
 """Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
 unless its profile is asked for: engines that follow the law take their steps in Python."""
@@ -55,8 +44,6 @@ take from there to its horizon: nothing is compared there."""
 COMPILED = ("reference", "compiled")  # who follows what the truth has followed
 _OF_RUNS = {"profile": TEXT, "settings": Public("a mapping from names to values", lambda one: isinstance(one, Mapping))}
 _Kind = TypeVar("_Kind")
-READER = "reader"
-"""Setting of an engine that reads files by itself: "file", or "scene" for the model of the scene."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,7 +116,7 @@ def run_case(
         watch.limited(label, limit)
         why = watch.lost(label)
         began = _clock()
-        made = partial(_entry, case, pick, of_pick(asked, pick), reference, refine, budget, truth.trusted)
+        made = partial(_entry, case, pick, of_pick(asked, pick), reference, refine, budget, truth)
         entry = ended(case, pick, why) if why else made()
         own = _own(case, pick, entry, settings or {})
         entries.append(replace(entry, took_s=_clock() - began, asked=own))
@@ -175,15 +162,15 @@ def of_start(case: Case, why: str) -> Trajectory:
 
 def _entry(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
-    known: float,
+    truth: Truth,
 ) -> Entry:  # fmt: skip
     """The run of one engine; whatever it throws is a row, and the others are judged."""
     if pick.skipped:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=pick.skipped)
     try:
         refine = refine or judges_parts(case, pick.engine, pick.profile)
-        run = partial(_ran, pick=pick, asked=asked, reference=reference, refine=refine, budget=budget, known=known)
-        return _as_far(case, pick, known, run)
+        run = partial(_ran, pick=pick, asked=asked, reference=reference, refine=refine, budget=budget, truth=truth)
+        return _as_far(case, pick, truth.trusted, run)
     except CaseUnsupported as error:
         return Entry(engine=pick.engine, profile=pick.profile, skipped=str(error))
     except CrossbodyError:  # wrong use of ours
@@ -228,7 +215,7 @@ def _bounded(case: Case, pick: Pick) -> bool:
 
 def _ran(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
-    known: float, left: float = 0.0,
+    truth: Truth, left: float = 0.0,
 ) -> Entry:  # fmt: skip
     most = DEAR * budget
     if pick.every and (dear := _dear(case, pick, asked, most)):
@@ -256,7 +243,7 @@ def _ran(
     if natural.outcome.ok and 0.0 < left * took <= BEYOND * budget:
         raise _CheapError
     run = _dense(case, pick, prepared, natural, asked)
-    studied, part = refine and natural.outcome.ok, ahead_of(case, known).t_end / case.t_end
+    short = ahead_of(case, truth.trusted)
     return Entry(
         engine=pick.engine,
         profile=pick.profile,
@@ -265,8 +252,8 @@ def _ran(
         run=run,
         clock=Clock(run=natural, around_s=around, compiled_s=count.seconds - compiled, cpu_s=took),
         audit=rows,
-        study=_study(ahead_of(case, known), pick, prepared, asked, natural, run, took * part, OF_STUDIES * budget)
-        if studied
+        study=refined(short, truth, (pick, asked), prepared, (natural, run), took * short.t_end / case.t_end, budget)
+        if refine and natural.outcome.ok
         else None,
         hidden=hidden,
         own=law_of(prepared.follows) if refine and prepared.follows is not None else None,
@@ -335,70 +322,3 @@ def _dense(case: Case, pick: Pick, prepared: Any, natural: Trajectory, given: Ma
         return natural  # samples have changed the steps: it is another run
     told = {"wall_s": natural.wall_s, "control_s": natural.control_s, "steps": natural.steps}
     return replace(with_both_sides(dense, natural), **told)  # type: ignore[arg-type]
-
-
-def _study(
-    case: Case, pick: Pick, prepared: Any, given: Mapping[str, Value], natural: Trajectory, judged: Trajectory,
-    took: float, most: float,
-) -> Study:  # fmt: skip
-    """The other runs of an engine that tell the parts of its error; those of its model where its equations are known.
-
-    They go as far as the case, which may end before the runs that are known: where its truth does. Where it reads the
-    file by itself they are of the model that is built from the scene. What was asked of the engine, they have too.
-    """
-    settings = prepared.settings
-    asked = {name: settings[name] for name in given if name in settings}
-
-    def run(**changed: Any) -> Trajectory | str:
-        limit = {"time_limit": STUDY_S} if "time_limit" in settings else {}
-        try:
-            found: Trajectory = engines.load(pick.engine).prepare(case, pick.profile, **(asked | changed | limit)).run()
-        except CaseUnsupported as error:
-            return str(error)
-        said = ", ".join(f"{name} {value}" for name, value in changed.items() if name != "samples")
-        return found if found.outcome.ok else f"A run with {said} ends {found.outcome.value}."
-
-    of_scene = {READER: "scene"} if settings.get(READER) == "file" else {}
-    size = {name: float(settings[name]) for name in ("dt", "rtol") if name in settings}
-    samples = {"samples": np.array(judged.t[judged.t <= case.t_end])} if "samples" in settings else {}
-    built = run(**of_scene, **size) if of_scene else None
-    of_scene = {} if isinstance(built, str) else of_scene
-    told: dict[str, Any] = {"why_built": built} if isinstance(built, str) else {"built": built}
-    if prepared.follows is not None:
-        return Study(**told)
-    if not size:
-        return Study(why="It has neither a step nor a tolerance that can be refined.", **told)
-    setting = next(iter(size))
-    for sizes in _sizes(setting, size[setting], natural.steps, case.tight):
-        cost = _cost(setting, sizes, size[setting], took)
-        while case.general and cost > most and len(sizes) > LEAST_SIZES:
-            sizes = sizes[:-1]
-            cost = _cost(setting, sizes, size[setting], took)
-        if case.general and cost > most:
-            return Study(why=f"The runs with other {setting} that are needed would take about {cost:.0f} s.", **told)
-        known = {} if setting == "rtol" else {size[setting]: natural if built is None or not of_scene else built}
-        runs = [known.get(one) or run(**of_scene, **{setting: one}, **samples) for one in sizes]
-        if not (failed := [one for one in runs if isinstance(one, str)]):
-            return Study(setting=setting, sizes=sizes, runs=tuple(runs), **told)  # type: ignore[arg-type]
-    return Study(why=failed[0], **told)
-
-
-def _cost(setting: str, sizes: Sequence[float], size: float, once: float) -> float:
-    """About what the runs of a study take, s, but for the one that is known."""
-    if setting == "rtol":
-        return once * DEARER * len(sizes)
-    return once * sum(size / one for one in sizes if one != size)
-
-
-def _sizes(setting: str, size: float, steps: int, tight: float) -> list[tuple[float, ...]]:
-    """Steps or tolerances of a study, falling; a second one is for when a run of the first fails."""
-    if setting == "rtol":
-        tightest = min(max(FINEST_TOLERANCE, tight), size)
-        return [(LOOSER * tightest, tightest)]
-    if steps > MANY_STEPS:
-        return [(RATIO**2 * size, RATIO * size, size), _halved(size, 2)]
-    return [_halved(size, min(max(2, int(math.log2(MANY_STEPS / max(steps, 1)))), HALVINGS))]
-
-
-def _halved(size: float, times: int) -> tuple[float, ...]:
-    return tuple(size / RATIO**k for k in range(times + 1))

@@ -31,13 +31,15 @@ from crossbody.reports.judging.parts import (
     Study,
     extrapolated,
     observed,
+    remaining,
+    settled,
     splits,
 )
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Verdict, Word
 from crossbody.reports.measuring.truth import Truth, from_run
-from crossbody.reports.runs import choice, jobs
+from crossbody.reports.runs import choice, jobs, refined
 
 NEAR = 1e-5  # s, between which velocities are differences
 BIPED = ROBOTS / "agility_cassie" / "cassie.xml"
@@ -210,7 +212,52 @@ def test_an_error_that_falls_without_an_order_is_told_to_what_its_differences_su
         return
     assert "No order" in found.says
     assert "sum to" in found.says
-    assert abs(found.largest["model"] - 1e-3 * case.t_end**2) <= found.known["model"] <= 8.0 * steps[-1]
+    most = 1.5 * steps[0] / LEAST_RATIO**3 / (LEAST_RATIO - 1.0)  # of differences by waves of size 1
+    assert abs(found.largest["model"] - 1e-3 * case.t_end**2) <= found.known["model"] <= most
+
+
+@pytest.mark.parametrize("order", [0.7, 1.0, 2.0])
+@pytest.mark.parametrize("runs", [5, 7, 9])
+def test_what_events_on_the_grid_of_a_step_leave_is_no_more_than_what_is_said(order: float, runs: int) -> None:
+    """Errors are a power of the step, and as much again that each step draws for itself, of 2 to 20 coordinates."""
+    rng, told = np.random.default_rng(runs), 0
+    for _ in range(300):
+        limit, smooth_, drawn = rng.normal(size=(3, 1, rng.integers(2, 21)))
+        steps = 0.5 ** np.arange(runs)
+        errors = [limit + h**order * (smooth_ + drawn * rng.uniform(size=limit.shape)) for h in steps]
+        if np.isfinite(rest := remaining(errors)):
+            told += 1
+            assert np.abs(errors[-1] - limit).max() <= rest
+    assert told > 200
+
+
+@pytest.mark.parametrize("runs", [3, 5, 9])
+def test_what_grows_or_stays_has_no_sum(runs: int) -> None:
+    for ratio in (1.0, 0.7, 1.4):
+        assert np.isnan(remaining([np.array([[ratio**-k]]) * (-1.0) ** k for k in range(runs)]))
+
+
+@pytest.mark.parametrize(("seconds", "most"), [(0.5, 3), (1e3, 9)])
+def test_steps_are_halved_until_the_parts_are_settled_or_there_is_no_time(
+    case: Case, seconds: float, most: int
+) -> None:
+    """Of an engine whose events stand on the grid of its step."""
+    rng, truth = np.random.default_rng(4), from_run(wave(case, 1e-3, 0.0, smooth, 1e3), Tier.A, "")
+
+    def at(dt: float) -> Trajectory:
+        return wave(case, dt, 1e-2, lambda t: np.sin(np.outer(t, rng.uniform(5.0, 50.0, 2))), 1.0)
+
+    runs = tuple(at(dt) for dt in STEPS)
+    few = Study(setting="dt", sizes=tuple(STEPS), runs=runs)
+    found = refined._further(case, truth, runs[0], few, at, 1e-3, seconds)
+    assert found.sizes == tuple(STEPS[0] / 2**k for k in range(len(found.sizes)))
+    assert len(found.runs) == len(found.sizes)
+    assert (len(found.sizes) == 3) == (seconds < 1.0)
+    if seconds > 1.0:
+        assert settled(case, truth, runs[0], found)
+        assert not settled(case, truth, runs[0], replace(found, sizes=found.sizes[:-1], runs=found.runs[:-1]))
+        told = split(case, truth, runs[0], found)
+        assert abs(told.largest["model"] - 1e-2 * case.t_end**2) <= told.known["model"]
 
 
 def test_what_differs_by_rounding_alone_has_no_order_and_is_converged(case: Case) -> None:
@@ -507,7 +554,7 @@ def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: p
     )
     pick, swing = choice.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
     told = [jobs.run_case(swing, [pick], truth=None).entries[0].study]
-    monkeypatch.setattr(jobs, "OF_STUDIES", 0.0)
+    monkeypatch.setattr(refined, "OF_STUDIES", 0.0)
     told.append(jobs.run_case(swing, [pick], truth=None).entries[0].study)
     assert [study is not None and len(study.runs) > 1 for study in told] == [True, False]
     assert told[1] is not None
@@ -515,14 +562,14 @@ def test_a_study_that_would_take_too_long_is_left_out_and_says_so(monkeypatch: p
 
 
 def test_a_study_has_as_many_steps_as_there_is_time_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jobs, "_cost", lambda setting, sizes, size, once: float(len(sizes)))
+    monkeypatch.setattr(refined, "_cost", lambda setting, sizes, size, once: float(len(sizes)))
     rod = Scene(
         bodies=(Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0)),),
         joints=(Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0)),),
     )
     pick, swing = choice.Pick(engine="mujoco", profile="matched"), case_of(rod, q0=[1.0], t_end=0.1)
     for seconds, count in ((10.0, 6), (4.5, 4), (3.0, 3), (2.9, 0)):
-        monkeypatch.setattr(jobs, "OF_STUDIES", seconds / BUDGET)
+        monkeypatch.setattr(refined, "OF_STUDIES", seconds / BUDGET)
         told = jobs.run_case(swing, [pick], truth=None).entries[0].study
         assert told is not None
         assert len(told.runs) == count
