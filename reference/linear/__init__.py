@@ -20,9 +20,10 @@ from crossbody.reference.linear._filtered import filtered
 from crossbody.reference.linear._many import Tangents, tangents
 from crossbody.reference.linear._modes import Locus, Modes, controllable, locus, modes, observable
 from crossbody.reference.linear._poses import Poses, poses
-from crossbody.reference.linear._sensitivity import Jump, Sensitivity, sensitivity
+from crossbody.reference.linear._sensitivity import Sensitivity, sensitivity
 from crossbody.reference.linear._trim import Trim, trim
 from crossbody.reference.linear._unmeasured import Estimate, Unknown
+from crossbody.reference.linear._walk import Jump
 from crossbody.reference.linear.linearisation import linearise
 from crossbody.reference.linear.model import LinearModel
 

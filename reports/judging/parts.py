@@ -223,7 +223,8 @@ def remaining(errors: Sequence[Floats]) -> float:
     fall = np.polyfit(age, np.log(np.maximum(sizes, np.finfo(float).tiny)), 1)[0]
     if fall < math.log(LEAST_RATIO):
         return math.nan
-    return float(np.max(sizes / LEAST_RATIO**age)) / (LEAST_RATIO - 1.0)
+    last: float = np.max(sizes / LEAST_RATIO**age)
+    return float(last / (LEAST_RATIO - 1.0))
 
 
 def settled(case: Case, truth: Truth, run: Trajectory, study: Study) -> bool:
