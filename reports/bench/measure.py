@@ -13,7 +13,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,9 @@ from crossbody.engines.equations import answering
 from crossbody.reports.bench.errors import PARTS, Truths, between, errors, known_to
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.order import orders
+from crossbody.reports.bench.scenes import labelled
+from crossbody.reports.judging.covered import followed_if_covered
+from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.run_verdicts import crash
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs import watch
@@ -70,10 +73,19 @@ class Rung:
         self.control.append(run.control_s)
 
 
+def _truths(case: Case) -> Truths:
+    """Return the truths of a case; of a scene as far as it is followed, of which its label tells."""
+    if not case.general or case.closed_form is not None:
+        return Truths(case)
+    known = followed_if_covered(case, BUDGET)
+    cut = {"t_end": known.case.t_end} if known.part < 1.0 else {}
+    return Truths(labelled(known.case, cut), replace(known, case=labelled(known.case, cut)))
+
+
 def _rungs(
-    case: Case, picks: Sequence[Pick], effort: Effort, tell: Callable[[str], None], limit: float
+    truths: Truths, picks: Sequence[Pick], effort: Effort, tell: Callable[[str], None], limit: float
 ) -> Iterator[Rung]:
-    truths = Truths(case)
+    case = truths.case
     for pick in (of_case(one, case) for one in picks):
         label = f"{case.label}: {pick.engine}:{pick.profile}"
         tell(label)
@@ -154,6 +166,9 @@ def bench(
         limit: time after which an engine that has not come back is ended with its process, s;
             from the command line.
 
+    Raises:
+        CaseUnsupported: for a file whose motion leaves what its model covers.
+
     Returns:
         One row a rung, columns `COLUMNS`; errors and honesty (error over tolerance) are ratios, event times in s;
         error_between is the position's on one grid for all, interpreted what of a run is Python, and native_ms the time
@@ -162,10 +177,11 @@ def bench(
         cores is processor time over wall time: 1 for one thread.
     """
     effort = Effort(repeats=effort) if isinstance(effort, int) else effort
-    rungs = list(_rungs(case, picks, effort, tell, limit))
+    truths = _truths(case)
+    rungs = list(_rungs(truths, picks, effort, tell, limit))
     watch.unlimited()  # all have come back once
     _rounds(rungs, effort)
-    return pd.DataFrame([row_of(case, rung) for rung in rungs], columns=list(COLUMNS))
+    return pd.DataFrame([row_of(truths.case, rung) for rung in rungs], columns=list(COLUMNS))
 
 
 def row_of(case: Case, rung: Rung) -> dict[str, Any]:

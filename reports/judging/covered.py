@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crossbody.cases import Case, CaseUnsupported
+from crossbody.cases import Case, CaseUnsupported, Outcome, Trajectory
 from crossbody.cases.files.case import rubbing
 from crossbody.reference import ahead
-from crossbody.reports.judging.reach import COARSE, motion
+from crossbody.reports.judging.reach import COARSE, Followed, followed, motion
 
 if TYPE_CHECKING:
     from crossbody.cases.files.contacts import Meeting
@@ -17,6 +17,27 @@ if TYPE_CHECKING:
 LOOSE = 100.0
 """Tolerance of a second run, in units of that of the first, which tells how far their motion is known."""
 SAME = 1e-3  # part of the time at which shapes meet by which two runs may be apart that know when
+
+
+def followed_if_covered(case: Case, budget: float) -> Followed:
+    """Return a scene as far as it is followed within a budget, s, by what covers its motion.
+
+    Raises:
+        CaseUnsupported: for a file whose motion leaves what its model covers: nothing could be judged.
+    """
+    reached = followed(covered(case, budget), budget)
+    refuse_uncovered(reached.case, reached.motion)
+    return reached
+
+
+def refuse_uncovered(case: Case, motion: Trajectory) -> None:
+    """Refuse a file that its motion contradicts.
+
+    Raises:
+        CaseUnsupported: if it does.
+    """
+    if case.file and motion.outcome is Outcome.INCONSISTENT:
+        raise CaseUnsupported(f"{case.label}: {motion.message}")
 
 
 def covered(case: Case, budget: float) -> Case:

@@ -22,10 +22,10 @@ from crossbody.reference.compiling import count
 from crossbody.reports.judging.audit import AuditRow, answered_once, audit, settings_kept
 from crossbody.reports.judging.clocks import Clock
 from crossbody.reports.judging.comparison import check_names, judges_parts
-from crossbody.reports.judging.covered import covered
+from crossbody.reports.judging.covered import followed_if_covered, refuse_uncovered
 from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.forces_of_scene import forces_of_scene
-from crossbody.reports.judging.reach import BUDGET, estimated, followed
+from crossbody.reports.judging.reach import BUDGET, estimated
 from crossbody.reports.judging.run_verdicts import Entry, crash
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.measuring.truth import Truth, sample_times
@@ -100,11 +100,10 @@ def run_case(
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} is not available. {why}")
     if truth is None and case.general and case.closed_form is None:
-        reached = followed(covered(case, budget), budget)
-        _refuse_uncovered(reached.case, reached.motion)
+        reached = followed_if_covered(case, budget)
         case, truth = reached.case, truth_of(reached.case, reached, budget)
     truth = truth_of(case) if truth is None else truth
-    _refuse_uncovered(case, truth.trajectory)
+    refuse_uncovered(case, truth.trajectory)
     if math.isfinite(truth.tight):
         case = replace(case, tight=truth.tight)
     known = "reference" in engines.names()
@@ -138,12 +137,6 @@ def _own(case: Case, pick: Pick, entry: Entry, settings: Mapping[str, Value]) ->
 def _clock() -> float:
     """Time that stands still while code is compiled, s."""
     return perf_counter() - count.seconds
-
-
-def _refuse_uncovered(case: Case, motion: Trajectory) -> None:
-    """Refuse a file that its motion contradicts: nothing could be judged."""
-    if case.file and motion.outcome is Outcome.INCONSISTENT:
-        raise CaseUnsupported(f"{case.label}: {motion.message}")
 
 
 def ended(case: Case, pick: Pick, why: str) -> Entry:

@@ -16,6 +16,7 @@ import numpy as np
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CrossbodyError, EngineUnavailable, Outcome, Trajectory, UnknownName
+from crossbody.reports.judging.covered import covered
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.sweep.bounds import Overdue, bounded, killed, overheard
 from crossbody.reports.sweep.measure import SECOND_RTOL, Asked, Error, error, instants, residual
@@ -75,7 +76,7 @@ def _try(spec: Spec) -> Tried:
     """Build, prepare and run; every end is a value."""
     tried = Tried()
     try:
-        tried.case = cases.load(spec.case, spec.variant, **spec.parameters)
+        tried.case = covered(cases.load(spec.case, spec.variant, **spec.parameters), spec.time_limit)
         prepared, tried.settings = _prepared(spec, tried.case)
         began = time.perf_counter()
         with bounded(2.0 * spec.time_limit):
@@ -152,6 +153,8 @@ def _beside(spec: Spec, case: Case, settings: Mapping[str, float] | None) -> Cas
     }
     if "t_end" in case.parameters:
         near["t_end"] = case.t_end
+    if case.file:  # what the motion has decided
+        near["friction"] = case.parameters["friction"]
     return cases.load(spec.case, spec.variant, **near)
 
 

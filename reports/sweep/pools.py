@@ -18,6 +18,7 @@ from crossbody.cases import Case, CrossbodyError, InvalidValue, Outcome, Schedul
 from crossbody.cases.installed import shared
 from crossbody.engines.equations import system_of
 from crossbody.reference import System
+from crossbody.reports.judging.covered import covered
 from crossbody.reports.sweep.execute import EXCEPTION, REFUSED, Tried, crashed, execute, row
 from crossbody.reports.sweep.measure import Error, at_the_end
 from crossbody.reports.sweep.spec import Spec
@@ -44,7 +45,7 @@ def together(specs: Iterable[Spec]) -> list[dict[str, Any]]:
         if not spec.ends:
             continue
         try:
-            case = cases.load(spec.case, spec.variant, **spec.parameters)
+            case = covered(cases.load(spec.case, spec.variant, **spec.parameters), spec.time_limit)
             system = system_of(case)
         except CrossbodyError as error:
             rows.append(row(spec, Tried(outcome=REFUSED, message=str(error)), Error(), []))

@@ -10,10 +10,13 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported
+from crossbody.reports.bench.measure import bench
 from crossbody.reports.judging.covered import covered
 from crossbody.reports.judging.reach import BUDGET, COARSE
 from crossbody.reports.runs.choice import picks
 from crossbody.reports.runs.jobs import run_case
+from crossbody.reports.sweep.execute import SKIPPED, execute
+from crossbody.reports.sweep.spec import Spec
 
 SCENE = """<mujoco><worldbody><geom name="floor" type="plane" size="2 2 .1"/>
 <body name="a" pos="0 0 .05"><freejoint/><geom name="a" type="box" size=".05 .05 .05" mass="1"/></body>
@@ -71,3 +74,42 @@ def test_what_stays_within_its_model_is_as_it_was(tmp_path: Path, asked: list[fl
     assert len(asked) <= 2
     own = cases.load("bouncing_ball")
     assert covered(own, BUDGET) is own
+
+
+STANDS = """<mujoco><worldbody><geom name="floor" type="plane" size="9 9 .1" friction=".5 0 0"/>
+<body name="a" pos="0 0 .1"><joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
+<geom type="sphere" size=".1" mass="1" friction=".5 0 0"/></body></worldbody>
+<keyframe><key name="slides" qpos="0 0" qvel="{speed} 0"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0])
+def test_a_file_is_timed_and_stressed_with_the_friction_that_its_motion_comes_to(tmp_path: Path, speed: float) -> None:
+    """Without it the body fell through the floor, and engines that stand on it were rated by that."""
+    path = tmp_path / "stands.xml"
+    path.write_text(STANDS.format(speed=speed))
+    case = cases.load(str(path), "slides", t_end=0.1)
+    rows = bench(case, picks(("reference:compiled", "mujoco:as_is")), 1)
+    assert set(rows["outcome"]) == {"finished"}
+    errors = rows.set_index("engine")["error"].astype(float)
+    assert errors["reference"].max() < 1e-4
+    assert 1e-9 < errors["mujoco"].max() < 0.1, "a rating by what falls is of the size of the motion"
+    row = execute(spec_of(case))
+    assert (row["outcome"], row["verdict"]) == ("finished", "within")
+
+
+def spec_of(case: Case) -> Spec:
+    """What asks the reference for a case as it is, and another integrator for its truth."""
+    return Spec(
+        suite="own", index=0, draw=0, case=case.file, variant=case.variant, parameters={"t_end": case.t_end},
+        engine="reference", profile="compiled", rung=-1, ladder=None, seed=0, second=True, afford=True, limit=1e-6,
+        finishes=True, ends=False, max_steps=100_000, time_limit=60.0,
+    )  # fmt: skip
+
+
+def test_a_file_whose_motion_leaves_its_model_is_neither_timed_nor_stressed(tmp_path: Path) -> None:
+    meets = scene(tmp_path, ".01 0 .15")
+    with pytest.raises(CaseUnsupported, match="come within reach at t = 0 s"):
+        bench(meets, picks(("reference:compiled",)), 1)
+    row = execute(spec_of(meets))
+    assert row["outcome"] == SKIPPED
+    assert "come within reach at t = 0 s" in row["why"]
