@@ -469,7 +469,7 @@ def test_what_was_ended_or_skipped_is_not_measured(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(measure, "of_case", lambda pick, case: pick)
     named = ("one", "ended", "unable", "skipped", "two")
     picks = [Pick(engine=name, profile="p", skipped="It is not there." * (name == "skipped")) for name in named]
-    assert list(measure._rungs(case, picks, Effort(), lambda _: None, 1.0)) == ["one", "two"]
+    assert list(measure._rungs(measure.Truths(case), picks, Effort(), lambda _: None, 1.0)) == ["one", "two"]
     assert asked == ["one", "unable", "two"]
 
 
