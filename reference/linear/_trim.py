@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import Outcome
 from crossbody.cases.entry_points import checked_arguments
@@ -20,6 +20,7 @@ from crossbody.reference.linear.linearisation import point
 STEPS = 50
 SETTLED = 1e-13  # part of the terms of an equation that may be left
 HALVINGS = 20
+RANK = 1e-9  # part of the largest singular value below which rows push in no way of their own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,6 +35,8 @@ class Trim:
         outcome: FINISHED; STEP_LIMIT without an equilibrium nearby; ILL_POSED or NOT_FINITE on the way.
         pulling: active rows that would pull though they may not: the equilibrium exists for the
             equations alone.
+        shared: active rows whose multipliers the equations leave open, since others could bear their load;
+            those of least norm stand there.
     """
 
     q: Floats
@@ -44,6 +47,7 @@ class Trim:
     residual: float
     outcome: Outcome
     pulling: tuple[int, ...]
+    shared: tuple[int, ...] = ()
 
 
 @checked_arguments
@@ -82,6 +86,9 @@ def trim(
     x[2 * n + nu :] = _multipliers(at, x)
     at, outcome, left, force = _solved(at, x, unknown)
     lam = borne(at, terms(at, at.q, x[n : 2 * n], at.u)[2], x[n : 2 * n], x[2 * n + nu :])
+    shared = _shared(at, x) if outcome.ok and not at.slid else np.zeros(len(lam), dtype=bool)
+    if shared.any():
+        lam = _least(at, x)
     pulls = (
         (lam < -1e3 * SETTLED * force)
         & np.asarray(system.unilateral, dtype=bool)[at.active]
@@ -90,6 +97,7 @@ def trim(
     return Trim(
         q=_placed(at, x[:n]), v=x[n : 2 * n], u=x[2 * n : 2 * n + nu], lam=lam, active=at.active,
         residual=left, outcome=outcome, pulling=tuple(at.active[pulls].tolist()),
+        shared=tuple(at.active[shared].tolist()),
     )  # fmt: skip
 
 
@@ -138,6 +146,27 @@ def _multipliers(at: Point, x: Floats) -> Floats:
     rubbed = borne(at, H, v, np.zeros(len(at.solved)))
     pushed = H.T @ (borne(at, H, v, np.eye(len(at.solved))) - rubbed[:, None])
     return np.asarray(np.linalg.lstsq(pushed, -f - rubbed @ H, rcond=None)[0], dtype=np.float64)
+
+
+def _shared(at: Point, x: Floats) -> NDArray[np.bool_]:
+    """Which multipliers (na,) of active rows, none of which slides, could be others that push in the same way."""
+    H = _forces(at, x)[1]
+    _, sizes, ways = np.linalg.svd(H.T)
+    idle = ways[int(np.sum(sizes > RANK * sizes.max(initial=0.0))) :]
+    return np.asarray(np.linalg.norm(idle, axis=0) > RANK)
+
+
+def _least(at: Point, x: Floats) -> Floats:
+    """The multipliers (na,) of least norm that balance the forces."""
+    f, H = _forces(at, x)
+    return np.asarray(np.linalg.lstsq(H.T, -f, rcond=RANK)[0], dtype=np.float64)
+
+
+def _forces(at: Point, x: Floats) -> tuple[Floats, Floats]:
+    """Forces (n,) but those of rows, and how all active rows push (na, n)."""
+    n = at.system.n
+    _, f, H, _, _ = terms(at, _placed(at, x[:n]), x[n : 2 * n], x[2 * n : 2 * n + at.system.inputs])
+    return f, H
 
 
 def _recentred(at: Point, x: Floats) -> Point:

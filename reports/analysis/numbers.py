@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import Case, CaseUnsupported
 from crossbody.cases.arrays import Floats
@@ -16,28 +16,41 @@ from crossbody.reference.delta.loop import characteristic
 from crossbody.reference.linear import controllable, modes, observable, poses
 from crossbody.reports.analysis.places import Place
 
-EQUILIBRIA = ("place", "outcome", "variable", "value")
+EQUILIBRIA = ("place", "outcome", "variable", "value", "shared")
 POLES = ("place", "real", "imag", "frequency", "damping", "led_by")
 RANKS = ("place", "states", "controllable", "observable", "growth")
 REFUSALS = ("place", "why")
 COEFFICIENTS = ("place", "axis", "s^2", "s", "1", "coupling")
 ALIKE = 1e-6
 """Part of the largest participation by which others are as large: places and speeds take part alike."""
+NOTHING = 1e-12
+"""Part of the largest number of a kind below which another one is what rounding leaves of zero."""
 RESPONSES = ("place", "input", "output", "omega", "magnitude", "phase")
 
 
 def equilibria(found: Sequence[Place], case: Case) -> pd.DataFrame:
-    """One row a variable: positions and rates that are not 0, inputs, multipliers of the active rows."""
+    """One row a variable: positions and rates that are not 0, inputs, multipliers of the active rows.
+
+    What rounding leaves of a 0 is one. Of `shared` multipliers the equations leave open how much each of them bears.
+    """
     rows = []
     for place in found:
         t = place.trim
-        values = list(zip([c.name for c in case.coordinates], t.q.tolist(), strict=True))
-        rates = zip([f"{c.name}'" for c in case.velocities], t.v.tolist(), strict=True)
+        rates = zip([f"{c.name}'" for c in case.velocities], _plain(t.v), strict=True)
+        values = list(zip([c.name for c in case.coordinates], _plain(t.q), strict=True))
         values += [(name, rate) for name, rate in rates if rate]
         values += [(f"u[{i}]", x) for i, x in enumerate(t.u.tolist())]
-        values += [(f"lam {case.contacts[i]}", x) for i, x in zip(t.active.tolist(), t.lam.tolist(), strict=True)]
-        rows += [{"place": place.name, "outcome": t.outcome.value, "variable": k, "value": x} for k, x in values]
+        about = {"place": place.name, "outcome": t.outcome.value}
+        rows += [about | {"variable": name, "value": x, "shared": False} for name, x in values]
+        for i, x in zip(t.active.tolist(), _plain(t.lam), strict=True):
+            rows.append(about | {"variable": f"lam {case.contacts[i]}", "value": x, "shared": i in t.shared})
     return pd.DataFrame(rows, columns=list(EQUILIBRIA))
+
+
+def _plain(values: Floats) -> list[float]:
+    """Values as they are, but for what rounding leaves of zeros among them."""
+    nothing = np.abs(values) <= NOTHING * np.abs(values).max(initial=0.0)
+    return [float(x) for x in np.where(nothing, 0.0, values)]
 
 
 def poles(found: Sequence[Place]) -> pd.DataFrame:
@@ -47,12 +60,19 @@ def poles(found: Sequence[Place]) -> pd.DataFrame:
         if place.model is None:
             continue
         m = modes(place.model)
-        for k, pole in enumerate(m.poles.tolist()):
+        real, imag = _parts(m.poles)
+        for k in range(len(m.poles)):
             rows.append(
-                {"place": place.name, "real": pole.real, "imag": pole.imag, "frequency": float(m.frequency[k]),
+                {"place": place.name, "real": real[k], "imag": imag[k], "frequency": float(m.frequency[k]),
                  "damping": float(m.damping[k]), "led_by": m.states[_leader(m.participation[:, k])]}
             )  # fmt: skip
     return pd.DataFrame(rows, columns=list(POLES))
+
+
+def _parts(poles: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Real and imaginary parts, without what rounding leaves of zeros."""
+    both = np.stack([poles.real, poles.imag])
+    return np.where(np.abs(both) <= NOTHING * np.abs(poles).max(initial=0.0), 0.0, both)
 
 
 def _leader(participation: Floats) -> int:

@@ -37,7 +37,7 @@ class Place:
         case: the scene in which it lies.
         system: its equations.
         trim: state, inputs and multipliers there.
-        model: its linear model, or None where there is no equilibrium.
+        model: its linear model, or None where there is no equilibrium, or a row would have to pull in it.
         t: time at which what depends on it is frozen, s.
         held: whether the rows that are on are held, instead of following their law.
         powered: whether the case's servos act.
@@ -100,12 +100,15 @@ def _place(
     made = build(case) if system is None else system
     u = case.inputs.at(t) if case.scene is not None and case.inputs is not None else None
     found = trim(made, case.q0 if q is None else q, v, u, active=active, free=free, rates=rates, inputs=inputs, t=t)
-    model = None
-    if found.outcome.ok:
+    model, why = None, ""
+    if found.pulling:
+        rows = ", ".join(case.contacts[i] for i in found.pulling)
+        why = f"It is one of the equations alone: {rows} would pull, and can only push."
+    elif found.outcome.ok:
         names = [coordinate.name for coordinate in case.velocities]
         model = linearise(made, found.q, found.v, found.u, active, names=names, reduce=held, t=t)
     return Place(
-        name=name, case=case, system=made, trim=found, model=model, t=t, held=held, powered=powered
+        name=name, case=case, system=made, trim=found, model=model, t=t, held=held, powered=powered, why=why
     )  # fmt: skip
 
 
@@ -216,7 +219,8 @@ def _visited(case: Case, at: Mapping[str, float]) -> list[Place]:
         slowest = [slips[j : j + system.tangents[i]].max() for i, slides in rows if slides for j in [system.tangent[i]]]
         least = -min(slowest) if slowest else np.abs(v).max()
         sets[rows] = min(sets.get(rows, (np.inf, k)), (float(least), k))
-    return [_seen(case, system, run, k, dict(rows)) for rows, (_, k) in sets.items()]
+    found = [_seen(case, system, run, k, dict(rows)) for rows, (_, k) in sets.items()]
+    return sorted(found, key=lambda place: place.model is None)
 
 
 def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int, bool]) -> Place:

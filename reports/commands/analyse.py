@@ -35,6 +35,7 @@ BY = {
     "equilibria": {"above": "place", "names": "variable"},
 }
 """How the lines of tables are named, and what stands above them."""
+SHARED = "How these share their load the equations leave open, and multipliers of least norm are shown"
 BESIDE = ["place", "way", "slope", "poles", "verdict"]
 """Columns that are printed of the differences of engines."""
 
@@ -127,9 +128,15 @@ def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
     for key in ("equilibria", "poles", "ranks", "coefficients", "limits"):
         if not len(tables.get(key, ())):
             continue
-        print_rows(tables[key].head(SHOWN), 6, f"{label}: {key}\n", heads=UNITS, **BY.get(key, {"above": "place"}))
+        shown = tables[key].head(SHOWN).drop(columns="shared", errors="ignore")
+        print_rows(shown, 6, f"{label}: {key}\n", heads=UNITS, **BY.get(key, {"above": "place"}))
         if len(tables[key]) > SHOWN:
             click.echo(f"... {len(tables[key]) - SHOWN} more rows; --out DIR keeps all.")
+        if "shared" in tables[key] and tables[key]["shared"].any():
+            open_ = ", ".join(tables[key].loc[tables[key]["shared"], "variable"].unique())
+            click.echo(
+                layout.told(f"The equations leave open how these share their load, and the least are shown: {open_}.")
+            )
         click.echo()
     for place, why in tables["refusals"].itertuples(index=False) if "refusals" in tables else ():
         click.echo(layout.told(f"{place}: {why}"))

@@ -219,6 +219,23 @@ def test_corners_that_share_a_load_hold_a_box():
         linearise(made, q, [1.0, 0, 0, 0, 0, 0], active=on, sliding=on)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_what_the_equations_leave_open_is_shared_by_least_norm_and_told(seed):
+    """Under a box that stands on a slope: weight and moments say no more of four corners with friction."""
+    rng = np.random.default_rng(seed)
+    half, tilt = rng.uniform(0.05, 0.3, 3), rng.uniform(0.0, 0.4)
+    scene = box_on_floor(0.5, half=tuple(half), tilt=tilt)
+    found = trim(system(scene, case_of(scene).law), [0, 0, half[2], 1, 0, 0, 0], active=[0, 1, 2, 3])
+    arms = [(x, y, -half[2]) for x in (-half[0], half[0]) for y in (-half[1], half[1])]
+    ways = [np.concatenate([way, np.cross(arm, way)]) for arm in arms for way in np.eye(3)]
+    load = scene.bodies[0].mass * G * np.array([np.sin(tilt), 0.0, -np.cos(tilt), 0.0, 0.0, 0.0])
+    least = np.linalg.lstsq(np.stack(ways, axis=1), -load, rcond=None)[0]
+    assert np.linalg.norm(found.lam) == pytest.approx(np.linalg.norm(least), rel=1e-9)
+    assert sorted(found.lam[:4]) == pytest.approx(sorted(least[2::3]), rel=1e-9)
+    assert set(found.shared) == set(found.active.tolist())
+    assert not trim(system(scene, case_of(scene).law), [0, 0, half[2], 1, 0, 0, 0], active=[0]).shared
+
+
 MADE = point(0.3, 0.0, spring=[100.0, 0.0], drift=0.1)
 
 

@@ -10,6 +10,7 @@ import pytest
 from crossbody import cases
 from crossbody.cases import CaseUnsupported, InvalidValue, Outcome, SceneError, UnknownName
 from crossbody.cases.mechanisms.maze import claims as maze_forms
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.reference import delta, simulate
 from crossbody.reference.delta.loop import closed_loop
 from crossbody.reference.delta.scene import controller_of, robot_of
@@ -30,6 +31,7 @@ from crossbody.reports.analysis import places as analyse
 from crossbody.reports.analysis.loci import Family, limits
 
 RNG = np.random.default_rng(27)
+LAW = RowLaw(a0=1e4, a1=50.0)
 
 
 def at(name, variant, rows, spread=1e-2, **changed):
@@ -361,6 +363,19 @@ def test_every_place_of_a_case_is_an_equilibrium(name, variant):
         assert place.trim.outcome is Outcome.FINISHED
         assert place.trim.residual < 1e-10
         assert not place.trim.pulling
+
+
+@pytest.mark.parametrize(("low", "stands"), [(-0.2, False), (0.3, True)])
+def test_where_a_row_would_have_to_pull_there_is_no_equilibrium(low, stands):
+    """A rod that hangs swings against a bound: only one beyond the lowest place holds it."""
+    rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
+    hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0), range=(low, 2.0), law=LAW)
+    case = cases.from_scene(Scene(bodies=(rod,), joints=(hinge,)), q0=[0.8], t_end=2.0)
+    (touches,) = (place for place in analyse.places(case) if place.name == "touching hinge low")
+    assert (touches.model is not None) == stands
+    assert touches.why == (
+        "" if stands else "It is one of the equations alone: hinge low would pull, and can only push."
+    )
 
 
 def test_the_command_writes_tables_and_a_page(tmp_path, capsys):

@@ -90,13 +90,16 @@ def test_equilibria_have_every_number_by_its_name() -> None:
     case, rng = cases.load("red_body"), np.random.default_rng(5)
     q, v, u, lam = (rng.normal(size=n) for n in (6, 6, 2, 2))
     v[::2] = 0.0
-    trim = SimpleNamespace(q=q, v=v, u=u, lam=lam, active=np.array([1, 3]), outcome=Outcome.FINISHED)
+    trim = SimpleNamespace(q=q, v=v, u=u, lam=lam, active=np.array([1, 3]), outcome=Outcome.FINISHED, shared=(3,))
+    q[2], lam[0] = 1e-15, -1e-106
     table = numbers.equilibria([SimpleNamespace(name="here", trim=trim)], case)
     assert set(zip(table["place"], table["outcome"], strict=True)) == {("here", "finished")}
     names = [c.name for c in case.coordinates]
+    q[2], lam[0] = 0.0, 0.0  # what rounding leaves of them
     wanted = dict(zip(names, q, strict=True)) | {f"{names[i]}'": v[i] for i in (1, 3, 5)}
     wanted |= {"u[0]": u[0], "u[1]": u[1], f"lam {case.contacts[1]}": lam[0], f"lam {case.contacts[3]}": lam[1]}
     assert dict(zip(table["variable"], table["value"], strict=True)) == wanted
+    assert table["variable"][table["shared"]].tolist() == [f"lam {case.contacts[3]}"]
 
 
 @pytest.mark.parametrize("seed", range(4))
