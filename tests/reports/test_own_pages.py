@@ -81,10 +81,11 @@ def test_a_report_of_what_nobody_has_changed_cannot_either(
 ) -> None:
     out = write(tmp_path / "out", result)
     for name, error in zip(("precision", "playback", "friction"), KINDS, strict=False):
-        with monkeypatch.context() as patched, pytest.raises(SystemExit) as end:
-            patched.setattr(case_page, name, raising(error))
+        monkeypatch.setattr(case_page, name, raising(error))
+        with pytest.raises(SystemExit) as end:
             main(["report", str(out)])
         assert end.value.code == 3
+        monkeypatch.undo()
 
 
 @pytest.mark.parametrize("name", sections.names())
