@@ -206,6 +206,7 @@ def build(
         model = obvious(scene, colliding=case.gates is not None)
     else:
         model = matched(scene)
+    law = {"law": softness(mujoco, *all_rows(mujoco, model))} if profile == "as_is" else {}  # as it was read
     _set_cone(model.opt, cone, impratio, noslip)
     if timeconst > 0.0:
         model.geom_solref[:, 0] = model.pair_solref[:, 0] = timeconst
@@ -230,7 +231,8 @@ def build(
     if switched is not None and switched.nc > switched.always:
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
         prepared.entered = switched.entered
-    prepared.audit = _audit(case, profile, scene, model, rows) | {"set": _set(model, cone, impratio, noslip, timeconst)}
+    own = {"set": _set(model, cone, impratio, noslip, timeconst)}
+    prepared.audit = _audit(case, profile, scene, model, rows) | law | own
     return prepared
 
 
@@ -255,7 +257,10 @@ def _set(model: Any, cone: str, impratio: float, noslip: int, timeconst: float) 
     found: dict[str, Any] = {"cone": names[int(model.opt.cone)]} if cone != "own" else {}
     found |= {"impratio": float(model.opt.impratio)} if impratio > 0.0 else {}
     found |= {"noslip": int(model.opt.noslip_iterations)} if noslip >= 0 else {}
-    return found | ({"timeconst": float(model.geom_solref[:, 0].max(initial=0.0))} if timeconst > 0.0 else {})
+    constants = np.append(model.geom_solref[:, 0], model.pair_solref[:, 0])
+    return found | (
+        {"timeconst": float(max(constants, key=lambda one: abs(one - timeconst)))} if timeconst > 0.0 else {}
+    )
 
 
 def _guard(case: Case, data: Any, rows: Rows) -> Callable[[], bool]:
@@ -432,8 +437,6 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
         "gravity": 0.0 if weightless else float(np.linalg.norm(model.opt.gravity)),
         "q0": case.q0, "v0": case.v0, "M": M, "bias": bias,
     }  # fmt: skip
-    if profile == "as_is":
-        found["law"] = softness(mujoco, *all_rows(mujoco, model))
     if profile == "matched" or not case.general:
         found["constants"] = rows.constants(own=profile == "default")
     hidden = {} if profile == "matched" else {"constants": SOFT, "lam": SOFT if case.gates is None else ALL_AT_ONCE}

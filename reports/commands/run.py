@@ -25,6 +25,7 @@ from crossbody.reports.judging.verdict import Row, Word, exit_code
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import results
 from crossbody.reports.runs import files, jobs, output, store, study, watch
+from crossbody.reports.runs.origin import blamed
 from crossbody.reports.runs.parts import Parts
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
@@ -77,7 +78,8 @@ def run(
             rows = study.assemble(made, [parts.part(key(i, case)) for i, case in enumerate(cases)], told)
             _check_any(rows)  # before an earlier report is replaced
             # Pages take longer than all but the engines: what they show is printed before them, and lost by nothing.
-            times, rests = results.times_of(made)
+            with blamed(made):
+                times, rests = results.times_of(made)
             untold = _tell(rows, times, made, controlled=any(case.control is not None for case in cases))
             if rests and not (voice.quiet() or voice.as_json()):
                 print(layout.told(rests))

@@ -22,6 +22,7 @@ from crossbody.reports.pages.html import BEYOND, Link, Page
 from crossbody.reports.pages.playback import playback
 from crossbody.reports.pages.precision import precision
 from crossbody.reports.pages.results import CaseFiles, Results, at_rest
+from crossbody.reports.runs.origin import BROKEN, blamed
 from crossbody.reports.runs.store import Trace
 
 NAMED = 6
@@ -55,7 +56,7 @@ PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit"
 def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     """All sections of one case, with a share of the usual room; its motions are forgotten with the page."""
     traces, rows = case.traces(), found.rows.get(case.label, [])
-    moving = playback(traces, share)
+    moving = _moving(found.out, traces, share)
     about, sources = _about(case.about)
     said = sentence(runs_of(rows)).replace(f" on {case.label}", "") if rows else ""
     return Page(
@@ -73,6 +74,16 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
             _runs(traces, case.about), *_audit(found, case), provenance(found.told),
         ],
     )  # fmt: skip
+
+
+def _moving(out: Path, traces: Sequence[Trace], share: float) -> list[Section]:
+    """The playback; where motions are not as they were written, and cannot be drawn, the other sections stand alone."""
+    try:
+        with blamed(out):
+            return playback(traces, share)
+    except BROKEN as error:
+        told = f"This motion cannot be drawn: {type(error).__name__}: {error}."
+        return [Section(name="playback", title="Playback", text=told)]
 
 
 def _beside(found: Results, case: CaseFiles) -> tuple[Link | None, Link | None]:

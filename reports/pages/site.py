@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from jinja2 import TemplateError
-
 from crossbody.cases import OutputError
 from crossbody.reports import sections as studies
 from crossbody.reports.figures.section import Section
@@ -21,6 +19,7 @@ from crossbody.reports.pages.index_page import index_pages
 from crossbody.reports.pages.results import Results, read
 from crossbody.reports.runs import beside, manifest, output
 from crossbody.reports.runs.manifest import INDEX, PAGE
+from crossbody.reports.runs.origin import BROKEN, blamed
 from crossbody.reports.runs.study import read_json
 
 FULL = 2.25  # cases whose plots have their usual room in a single file; those of more share it
@@ -58,8 +57,9 @@ def _make(made: Path, single_file: bool, against: Path | None, others: Sequence[
     out = output.gather(made)
     beside.take(made, [other for other in others if other.resolve() != out.resolve()])
     try:
-        found = read(made, against)
-        for name, text in _rendered(found, single_file):
+        with blamed(made, against=against):
+            found = read(made, against)
+        for name, text in _rendered(found, single_file, against):
             _put(made, name, text.encode(), output.put)
     except OutputError as error:  # the hidden folder is nobody's business
         raise OutputError(str(error).replace(str(made), str(out))) from error
@@ -67,25 +67,20 @@ def _make(made: Path, single_file: bool, against: Path | None, others: Sequence[
         _put(made, name, data, output.put_shared)
 
 
-_BROKEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError, RecursionError, TemplateError)
-"""What making a page of tables raises that are not what they should be."""
-
-
-def _rendered(found: Results, single_file: bool) -> Iterator[tuple[str, str]]:
+def _rendered(found: Results, single_file: bool, against: Path | None) -> Iterator[tuple[str, str]]:
     """Name and text of every page, made one after another."""
     try:
-        links = _links(found)
-        if single_file:
-            yield (
-                PAGE,
-                render(list(_pages(found, FULL / max(FULL, len(found.cases)))), links, found.footer, single=True),
-            )
-            return
-        for page in _pages(found):
-            yield f"{page.name}.html", render([page], links, found.footer)
+        with blamed(found.out, against=against):
+            links = _links(found)
+            if single_file:
+                pages = list(_pages(found, FULL / max(FULL, len(found.cases))))
+                yield PAGE, render(pages, links, found.footer, single=True)
+                return
+            for page in _pages(found):
+                yield f"{page.name}.html", render([page], links, found.footer)
     except OutputError:
         raise
-    except _BROKEN as error:
+    except BROKEN as error:
         raise OutputError(_unreadable(found, error)) from error
 
 

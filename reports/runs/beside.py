@@ -7,7 +7,7 @@ from pathlib import Path
 
 from crossbody.cases import OutputError
 from crossbody.reports.runs import files
-from crossbody.reports.runs.output import recover, require_ours
+from crossbody.reports.runs.output import recover, require_ours, took
 
 OWN = ("verdicts", "audit", "provenance")
 """Of every folder; they stay those of the folder that is taken into."""
@@ -42,6 +42,7 @@ def take(made: Path, others: Sequence[Path]) -> None:
         try:
             (made / path.name).unlink(missing_ok=True)
             (made / path.name).write_bytes(files.read_inside(path.parent, path.name))
+            took(made, path.name)
         except OutputError:
             raise
         except OSError as error:

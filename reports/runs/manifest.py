@@ -42,6 +42,11 @@ def is_table(name: str) -> bool:
     return _TABLE.fullmatch(name) is not None
 
 
+def is_result(name: str) -> bool:
+    """Whether a file may be a table or a motion of a study."""
+    return is_table(name) or _MOTION.fullmatch(name) is not None
+
+
 def is_base(name: str) -> bool:
     """Whether every folder has this file: a study without verdicts writes it only where nobody has."""
     return _BASE.fullmatch(name) is not None
@@ -142,6 +147,16 @@ def _unchanged(folder: Path, sums: Mapping[str, str]) -> Iterator[str]:
             continue  # a link or a folder stands there
         except OSError as error:
             raise OutputError(f"{folder / name} cannot be read: {error.strerror}.") from None
+
+
+def intact(folder: Path) -> frozenset[str]:
+    """Return the files of a folder that are, byte by byte, as crossbody wrote them there; none without a manifest."""
+    try:
+        text = files.read_inside(folder, MARKER).decode("utf-8", errors="replace")
+        sums = [one for study in _studies(folder / MARKER, text).values() for one in study.items()]
+        return frozenset(name for name, told in sums if files.digest(folder, name) == told)
+    except OSError:
+        return frozenset()
 
 
 def _recognised(folder: Path) -> list[str]:

@@ -43,12 +43,13 @@ OURS = (MARKER, HALF)  # how all that begins that crossbody makes in an output f
 
 @dataclass(slots=True)
 class _Staged:
-    """A study that is being written: into which folder, and others' files beside it for the pages."""
+    """A study that is being written: into which folder, others' files beside it for the pages, and those taken in."""
 
     home: Path
     study: str
     adds: bool
     linked: dict[str, tuple[int, int]] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=set)
 
     def is_linked(self, made: Path, name: str) -> bool:
         """Whether a file is still that of another study, and not written anew."""
@@ -66,6 +67,22 @@ def _identity(path: Path) -> tuple[int, int]:
 def is_staged(path: Path) -> bool:
     """Whether a folder is that of a study which this process is writing."""
     return path in _STAGED
+
+
+def home(path: Path) -> Path:
+    """Return the output folder of a study that is being written; another folder is its own."""
+    return _STAGED[path].home if path in _STAGED else path
+
+
+def others(made: Path) -> set[str]:
+    """Return the files of a study that is being written which it has not written itself."""
+    staged = _STAGED[made]
+    return staged.taken | {name for name in staged.linked if staged.is_linked(made, name)}
+
+
+def took(made: Path, name: str) -> None:
+    """Note that a file of a study that is being written was taken from another folder."""
+    _STAGED[made].taken.add(name)
 
 
 def is_ours(path: Path) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from crossbody.cases import SceneError
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import quaternions
 from crossbody.cases.rotations import matrices, rates
@@ -71,7 +72,7 @@ def stage(p: Parameters) -> Stage:
     """Return what is drawn of every body: its shapes, but those inside its boxes, or the box of its inertia."""
     scene = _scene(p)
     if len(scene.bodies) > MOST:
-        raise ValueError(f"it has {len(scene.bodies)} bodies; at most {MOST} can be drawn")
+        raise SceneError(f"it has {len(scene.bodies)} bodies; at most {MOST} can be drawn")
     index = {"": -1} | {body.name: i for i, body in enumerate(scene.bodies)}
     shown = {shape.body for shape in scene.shapes}
     boxes = [_inertia_box(body, i) for i, body in enumerate(scene.bodies) if body.name not in shown and body.mass]

@@ -15,13 +15,13 @@ a folder may hold several studies.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import cast
 
 from crossbody.cases import installed
 from crossbody.cases.registry import Registry
 from crossbody.reports.figures.section import Section
+from crossbody.reports.runs.origin import BROKEN, blamed, written_by
 from crossbody.reports.sections._own import STUDIES, Study
 
 OWN = tuple(STUDIES)  # names that no plug-in can take
@@ -45,30 +45,22 @@ def load(name: str) -> Study:
 
 
 def shown(name: str, out: Path) -> tuple[Section, ...]:
-    """Sections of a study in a folder; one that says so where another version wrote its tables.
+    """Sections of a study in a folder; one that says so where its tables are not as this version wrote them.
 
-    A fault in making a section from tables of this version stays loud.
+    Raises:
+        OwnFault: if they are.
     """
     study = load(name)
     try:
-        return study.sections(out)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, ArithmeticError) as error:
-        wrote, mine = _written_by(out), installed.version("crossbody")
+        with blamed(out):
+            return study.sections(out)
+    except BROKEN as error:
+        wrote, mine = written_by(out / "provenance.json"), installed.version("crossbody")
         told = (
-            f"These tables cannot be shown ({type(error).__name__}: {error}), although this "
-            "version wrote them: they were changed, or this is a fault of crossbody. Run the "
-            "study again, and report it if it persists."
+            f"These tables cannot be shown ({type(error).__name__}: {error}): they were changed since this version "
+            "wrote them. Run the study again."
             if wrote == mine
             else f"Another version of crossbody wrote these tables ({wrote or 'unknown'}; {error} is not as "
             "expected): run the study again."
         )
         return (Section(name=name, title=study.TITLE, text=told),)
-
-
-def _written_by(out: Path) -> str:
-    """Version of crossbody in the provenance of a folder; empty where it is not given."""
-    try:
-        told = json.loads((out / "provenance.json").read_text(encoding="utf-8"))
-        return str(told["versions"]["crossbody"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return ""
