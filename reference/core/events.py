@@ -75,6 +75,7 @@ from crossbody.reference.kinds import Bytes
 EARLY = 0.5  # part of a step before which a gap that opens again has been below zero for too few of its places
 WITH_IT, BEFORE_IT = 1.2, 0.5  # of what a step up to an event is, that is taken anew with or without it
 MATTERS = 1e3  # times as deep as a gap is known to, from which on what presses there is looked for by shorter steps
+STEADY = 0.5  # part of what has no direction that a slip must have lost as fast as at its end: one that grazes has less
 PULLS = 1e-6  # part of the largest force by which a contact pulls that is no rounding of where it lets go
 
 
@@ -290,12 +291,22 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> float:
 
 @compiled
 def _ends_beyond_zero(s: Any, m: Model, w: Work, mode: Bytes) -> bool:
-    """Whether a slip passes zero, and the step ends before it is known to stop: the next one could not tell where."""
+    """Whether a slip passes zero, and the step ends before it is known to stop: the next one could not tell where.
+
+    One that turns, and loses less in a step than it may pass zero by, stops if it fell as steadily since it was slow.
+    """
     for i in range(s.nc):
         if mode[i] == SLIP and has_friction(m, i) and not has_begun(w, i):
-            end, below = slip_along(m, w, i, w.rates[NODES - 1]), GRAZE * least_slip(s)
-            if -below <= end < 0.0 and slip_along(m, w, i, w.rates[0]) > below:
+            start, end = slip_along(m, w, i, w.rates[0]), slip_along(m, w, i, w.rates[NODES - 1])
+            below = GRAZE * least_slip(s)
+            if -below <= end < 0.0 and start > below:
                 return True
+            if m.tangents[i] > 1 and -below <= end < 0.0 < start:
+                part = start / (start - end)
+                since = s.t_old + part * s.hs - w.within[i]
+                if (start - end) * since > STEADY * least_slip(s) * s.hs:
+                    w.hit[i], w.kind[i] = part, STOP
+                    s.theta = min(s.theta, part)
     return False
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core.coulomb import respond
 from crossbody.reference.core.friction import (
     CLEAR,
     bound,
@@ -19,14 +20,15 @@ from crossbody.reference.core.friction import (
     slip_along,
     small_slip,
 )
-from crossbody.reference.core.guards import STOP
+from crossbody.reference.core.guards import GRAZE, STOP
 from crossbody.reference.core.layout import NODES, Model, Work
 from crossbody.reference.kinds import Array
 
 FORGETS = 300.0  # times as much as it began with: then it counts from none, which turns it by 3e-3 rad at most
 NEAR = 2.0  # times as much as has no direction: what a step may be off turns so slow a slip as well
 TURNED = 1e-4  # less than one, of the cosine between where a slip that dies out was last clear of zero and where it is
-LINGERS = 10.0  # times as long as friction takes to stop what has no direction: what slides so slowly is held
+LINGERS = 10.0  # times as long as it takes to stop what has no direction: what slides so slowly is at rest
+HELD = 1e-6  # part of what a contact would yield by itself, below which others hold it
 
 
 @compiled
@@ -129,10 +131,40 @@ def _rest(m: Model, w: Work, i: int) -> float:
 
 
 @compiled
-def _lingers(s: Any, m: Model, w: Work, i: int, rate: Array) -> bool:
-    """Whether contact i has been sliding without a direction for far longer than its friction takes to stop it.
+def _loses(s: Any, m: Model, w: Work, i: int, rate: Array) -> float:
+    """How fast contact i, which slides, loses its slip at the present instant as evaluated, m/s^2."""
+    size, total = slip(m, w, i, rate), 0.0
+    for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
+        j = w.listed[t]
+        change = w.Hdv[j]
+        for c in range(m.span[t, 0], m.span[t, 1]):
+            change += w.H[j, c] * w.k[0, s.nq + c]
+        total -= change * (rate[t] - m.drift[t] - w.rest[t])
+    return float(total / size if size > 0.0 else 0.0)
 
-    Others hold the body, and what they leave it dies out without ever passing zero. Such a contact is at rest.
+
+@compiled
+def _is_held(s: Any, m: Model, w: Work, i: int) -> bool:
+    """Whether other contacts hold what contact i slides on: a force along its direction changes their forces alone."""
+    first, end, own, moved = w.listed[m.tangent[i]], w.listed[m.tangent[i]] + m.tangents[i], 0.0, 0.0
+    for j in range(s.na):
+        w.pushed[j] = 0.0
+        for c in range(first, end):
+            w.pushed[j] -= w.gram[j, c] * w.along[c]
+    respond(s, m, w, w.pushed, w.excess)
+    for c in range(first, end):
+        own -= w.pushed[c] * w.along[c]
+        for j in range(s.na):
+            moved += w.along[c] * w.gram[c, j] * w.excess[j]
+    return bool(own + moved < HELD * own)
+
+
+@compiled
+def _lingers(s: Any, m: Model, w: Work, i: int, rate: Array) -> bool:
+    """Whether contact i has been sliding without a direction for far longer than it takes to stop what has none.
+
+    Others hold the body, and what they leave it dies out without ever passing zero, far slower than friction would have
+    it: such a contact is at rest. One that they do not hold loses its slip as it does, by its friction less its weight.
     """
     if has_begun(w, i) or slip(m, w, i, rate) > least_slip(s):
         w.within[i] = np.inf
@@ -140,6 +172,8 @@ def _lingers(s: Any, m: Model, w: Work, i: int, rate: Array) -> bool:
     w.within[i] = min(w.within[i], s.t)
     c = w.listed[m.tangent[i]]
     brake = bound(m, i, w.lam0[i]) * w.gram[c, c]
+    if m.tangents[i] > 1 and not _is_held(s, m, w, i):
+        brake = _loses(s, m, w, i, rate)
     return bool((s.t - w.within[i]) * brake > LINGERS * least_slip(s))
 
 
@@ -166,7 +200,9 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
     for i in range(s.nc):
         if has_friction(m, i) and w.slides[i]:
             _forget(s, m, w, i, slip(m, w, i, rate))
-            if has_begun(w, i) and slip_along(m, w, i, rate) < -small_slip(s):
+            along = slip_along(m, w, i, rate)
+            slow = m.tangents[i] > 1 and slip(m, w, i, rate) <= least_slip(s)
+            if along < -small_slip(s) if has_begun(w, i) else slow and along < -GRAZE * least_slip(s):
                 w.hit[i], w.kind[i], linger = 0.0, STOP, True  # it has passed zero, by less in each step than is known
             elif slip(m, w, i, rate) > small_slip(s):
                 face(m, w, i, rate)

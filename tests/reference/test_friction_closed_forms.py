@@ -89,16 +89,24 @@ def stops_at(kappa: float, tangent: float, speed: float, th: float) -> tuple[flo
 
 @pytest.mark.parametrize("block", range(4))
 def test_any_oblique_slide_stops_on_time(block: int) -> None:
-    """Also where a step ends just beyond the stop. What counts as no slip may be let go where it is braked weakly."""
+    """Also where a step ends just beyond the stop, and where friction is hardly more than the weight pulls.
+
+    What the tolerance leaves open in the speed takes so much the longer to be lost.
+    """
     rng = np.random.default_rng((75, block))
     for _ in range(25):
-        kappa, tangent = 1.0 + 10.0 ** rng.uniform(-1.5, 0.5), rng.uniform(0.1, 0.8)
+        kappa, tangent = 1.0 + 10.0 ** rng.uniform(-2.3, 0.5), rng.uniform(0.1, 0.8)
         speed, th = 10.0 ** rng.uniform(-1.0, 0.5), np.radians(rng.uniform(3.0, 177.0))
         t, brake = stops_at(kappa, tangent, speed, th)
         system = point(kappa * tangent, np.arctan(tangent), space=True)
-        run_ = simulate(system, [0, 0, 0], [speed * np.cos(th), speed * np.sin(th), 0], 1.2 * t, rtol=1e-11)
-        [(found, *_)] = moved(run_)
-        assert abs(found - t) < TIME * max(1.0, t) + (1e-9 * speed / brake if kappa < 1.1 else 0.0), (kappa, th)
+        errors, rtols = list[float](), (1e-7, 1e-9, 1e-11)
+        for rtol in rtols:
+            run_ = simulate(system, [0, 0, 0], [speed * np.cos(th), speed * np.sin(th), 0], 1.2 * t, rtol=rtol)
+            [(found, *_)] = moved(run_)
+            errors.append(abs(found - t))
+        lost = speed / brake
+        assert errors[-1] < TIME * max(1.0, t, lost), (kappa, th)
+        assert all(off < 10.0 * rtol * max(t, lost) for off, rtol in zip(errors, rtols, strict=True)), (kappa, th)
 
 
 def test_box_stops_flat_at_one_event() -> None:
