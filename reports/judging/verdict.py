@@ -83,8 +83,7 @@ class Verdict:
         regression: "kept" or "lost" by that band; empty without one.
         known: what the number is known to, of a part of an error; NaN where nothing is said. One
             below it is none.
-        where: of what the number is and when, in its own unit, where it is beyond its limit and
-            its metric can say so.
+        where: of what the number is, by how much in its own unit, and when, where its metric can say so.
     """
 
     case: str
