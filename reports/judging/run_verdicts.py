@@ -36,6 +36,7 @@ from crossbody.reports.judging.verdict import (
     FACTOR,
     IDENTITIES,
     LACKS,
+    NOT_MEASURED,
     ROUNDING,
     Verdict,
     Word,
@@ -490,7 +491,7 @@ def _unlike(judge_: Judge, name: str, found: Split, whole: float) -> Iterator[Ve
 def _part(judge_: Judge, name: str, part: str, found: Split, unit: str) -> Iterator[Verdict]:
     row = part_of(name, part)
     if part in found.missing:
-        yield judge_.row(row, math.nan, unit, Word.INFO, f"Not measured. {found.missing[part]}")
+        yield judge_.row(row, math.nan, unit, Word.INFO, f"{NOT_MEASURED}{found.missing[part]}")
     if part not in found.there:
         return
     why = f"Part of the error of {found.where}. {found.says if part != 'importer' else ''}".strip()

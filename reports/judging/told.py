@@ -101,6 +101,12 @@ def share(row: Row) -> float:
     return off / limit if limit > 0.0 and math.isfinite(off) else math.inf
 
 
+def distance(row: Row) -> str:
+    """Say how far a number that is a ratio is off in the unit of its signal; nothing where no place is known."""
+    said = _WHERE.search(row.get("where") or "") if row["unit"] == "1" else None
+    return f"{said[1]} {said[2]}" if said else ""
+
+
 def lacking(row: Row) -> str:
     """Say in few words why a row has no number."""
     if row["verdict"] == Word.SKIPPED:

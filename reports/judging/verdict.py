@@ -22,6 +22,8 @@ ROUNDING = 1e-12
 """Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
 LACKS = "The run lacks this number, which the truth has."
+NOT_MEASURED = "Not measured. "
+"""How the reason begins why a part of an error is not known."""
 UNMEASURED = "Known, but its size has not been measured here: "
 """How the reason of a number begins that is beyond its limit, nobody knows how far it may be."""
 IDENTITIES = frozenset(

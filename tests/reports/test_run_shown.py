@@ -236,3 +236,10 @@ def test_engines_that_nobody_selected_are_named(capsys: pytest.CaptureFixture[st
     assert said.startswith("Not selected: ")
     assert all(name in said for name in ("dart", "drake", "exudyn", "pymunk"))
     assert not any(name in said for name in DEFAULT_ENGINES)
+
+
+def test_a_dash_of_a_part_says_why_there_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    off = row("mujoco", "position", 2.0, Word.OUTSIDE, 1.0)
+    parts = [row("mujoco", part_of("position", one), math.nan, Word.INFO) for one in ("model", "step")]
+    run_shown.show([off, *(one | {"why": "Not measured. No order."} for one in parts)], {})
+    assert "not measured: model and step of mujoco:matched on ball:v. No order." in capsys.readouterr().out
