@@ -70,7 +70,7 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
         row("c", "penetration", 1e-3, Word.INFO),  # without a limit
     ]
     text = sentence(runs_of(rows))
-    assert text.startswith("1 of 2 runs is within all limits. Without a limit: c:matched on ball:v.")
+    assert text.startswith("1 of 2 runs is within all limits, none is outside. Without a limit: c:matched on ball:v.")
     assert text.endswith(
         "cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason."
     )
