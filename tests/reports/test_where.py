@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crossbody.cases import Case, Trajectory, load
+from crossbody.cases import Case, Coordinate, Trajectory, load
 from crossbody.reports.judging.comparison import judged
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.measuring.placed import Placed, largest
 from crossbody.reports.measuring.truth import Truth
-from crossbody.reports.metrics import position
+from crossbody.reports.metrics import _motions, position
 
 
 def cases() -> list[Case]:
@@ -108,3 +108,10 @@ def test_the_largest_of_errors_is_that_of_the_signal_and_the_instant_named(seed:
 
 def _size(said: str) -> float:
     return float(said.partition(" by ")[2].partition(" ")[0])
+
+
+def test_how_far_a_start_is_off_is_over_the_largest_of_its_own_unit() -> None:
+    named, motion = (Coordinate("x", "m"), Coordinate("turn", "rad")), np.array([[1.0, 1000.0]])
+    found = _motions._apart(np.array([1e-3, 0.0]), motion, named, False)
+    assert found == pytest.approx(1e-3)
+    assert found.where == "x by 0.001 m at 0 s"
