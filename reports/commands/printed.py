@@ -102,7 +102,10 @@ def _of_sentence(text: str, runs: Mapping[Run, Sequence[Row]]) -> Iterator[str]:
     """Yield what differs of how many runs are within."""
     found, said = kinds(runs), _SENTENCE.match(text)
     if said is None:
-        told = (text.startswith("The run is within"), text.startswith(("The run is not", "The run deviates")))
+        told = (
+            text.startswith("The run is within"),
+            text.startswith(("The run is not", "The run deviates", "No number of the run")),
+        )
         said_of_one = (1, int(told[0])) if any(told) else (0, 0)
         if said_of_one != (found["judged"], found["within"]) and found["judged"]:
             yield f"{found['within']} of {found['judged']} runs are within, not as in {text[:60]!r}"

@@ -14,7 +14,7 @@ from crossbody.reports import layout, voice
 from crossbody.reports.commands import printed
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, beyond, runs_of, sentence
-from crossbody.reports.judging.verdict import Regression, Row, Word
+from crossbody.reports.judging.verdict import NOT_MEASURED, Regression, Row, Word
 from crossbody.reports.layout import NO_BREAK, unit_text
 from crossbody.reports.pages.results import Times
 from crossbody.reports.runs.choice import DEFAULT_ENGINES
@@ -53,7 +53,7 @@ def show(rows: Sequence[Row], times: Times) -> None:
     above = [layout.told(sentence(runs)), table(runs, times, layout.columns()), layout.told(counted(rows))]
     lines = wrong(runs)
     lines += [_lost(run, row) for run in runs for row in run.rows if row["regression"] == Regression.LOST]
-    texts = [*above, *map(layout.told, [*lines, *([] if voice.quiet() else _absent(runs))])]
+    texts = [*above, *map(layout.told, [*lines, *([] if voice.quiet() else [*_unmeasured(runs), *_absent(runs)])])]
     for i, text in enumerate(texts):
         if i >= len(above) or not voice.quiet():
             click.echo(text + "\n" * (i < len(above) - 1))
@@ -158,6 +158,23 @@ def _lost(run: EngineRun, row: Row) -> str:
     value = f"{off:.4g}{unit_text(row['unit'])} from the claimed number, band {row['band']:.3g}"
     what = "worse than" if not off <= row["band"] else "not the number that this version of the engine gave in"
     return f"{what} the stored run: {run.label} {run.who} {row['metric']} {value}"
+
+
+def _unmeasured(runs: Sequence[EngineRun]) -> list[str]:
+    """One line a reason for which the table has no number of a part of an error."""
+    parts = {metric: head for head, metric in SHOWN.items() if head in PARTS}
+    found: dict[str, dict[str, list[str]]] = {}
+    for run in runs:
+        for row in (row for row in run.rows if row["metric"] in parts and not math.isfinite(row["value"])):
+            if row["why"].startswith(NOT_MEASURED):
+                those = found.setdefault(row["why"].removeprefix(NOT_MEASURED), {})
+                those.setdefault(f"{run.who} on {run.label}", []).append(parts[row["metric"]])
+    return [f"not measured: {_some(mine)}. {why}" for why, mine in found.items()]
+
+
+def _some(mine: Mapping[str, Sequence[str]]) -> str:
+    named = [f"{' and '.join(heads)} of {who}" for who, heads in mine.items()]
+    return "; ".join(named[:MANY]) + (f"; and {len(named) - MANY} more" if len(named) > MANY else "")
 
 
 def _absent(runs: Sequence[EngineRun]) -> list[str]:

@@ -36,6 +36,7 @@ from crossbody.reports.judging.verdict import (
     FACTOR,
     IDENTITIES,
     LACKS,
+    NOT_MEASURED,
     ROUNDING,
     Verdict,
     Word,
@@ -428,10 +429,8 @@ def _row(
     needs = getattr(metric, "NEEDS", "")
     excused = value is not None and math.isnan(value) and needs != "" and (needs in judge_.entry.hidden or not wanted)
     if value is not None and not excused:
-        found = judge_.judged(name, value, metric.UNIT, truth, compared)
-        place = getattr(metric, "where", None)
-        beyond = found.verdict != Word.WITHIN and math.isfinite(value) and value > found.limit
-        return replace(found, where=place(truth, run, judge_.case)) if place and beyond else found
+        found = judge_.judged(name, float(value), metric.UNIT, truth, compared)
+        return replace(found, where=getattr(value, "where", "") if math.isfinite(value) else "")
     if name in judge_.claims:
         return judge_.missing(name, metric.UNIT, "The run does not tell it.", needs)
     if wanted and metric.measure(truth, truth.trajectory, judge_.case) is not None:
@@ -451,7 +450,7 @@ def value_of(
 
     value = metric.measure(replace(truth, at=at), run, case)
     if value is not None:
-        value = float(instance(f"What measure of {name!r} returns", value, Real, "a number, NaN or None"))
+        instance(f"What measure of {name!r} returns", value, Real, "a number, NaN or None")
     return value, min(min(until) / case.t_end, 1.0)
 
 
@@ -492,7 +491,7 @@ def _unlike(judge_: Judge, name: str, found: Split, whole: float) -> Iterator[Ve
 def _part(judge_: Judge, name: str, part: str, found: Split, unit: str) -> Iterator[Verdict]:
     row = part_of(name, part)
     if part in found.missing:
-        yield judge_.row(row, math.nan, unit, Word.INFO, f"Not measured. {found.missing[part]}")
+        yield judge_.row(row, math.nan, unit, Word.INFO, f"{NOT_MEASURED}{found.missing[part]}")
     if part not in found.there:
         return
     why = f"Part of the error of {found.where}. {found.says if part != 'importer' else ''}".strip()

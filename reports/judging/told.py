@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, SPLIT, part_of
+from crossbody.reports.judging.remedies import remedy
 from crossbody.reports.judging.verdict import IDENTITIES, LACKS, UNMEASURED, Row, Word
 from crossbody.reports.layout import unit_text, valid
 from crossbody.reports.measuring.truth import TRUTH
@@ -19,7 +20,7 @@ SHORT = re.compile(r"(?:Followed|Known up) to (.*? s)(?: of .*? s)?: (.*?)\.(?: 
 FINISHED = "finished"  # the row that says whether a run came to its end
 _CLAUSE = re.compile(r"[:;,.](?:\s|$)")
 """What ends the first clause of a reason."""
-_WHERE = re.compile(r" by (\S+) (\S+) at ")
+_WHERE = re.compile(r"\bby (\S+) (\S+) at ")
 """How far a coordinate is off, and its unit, as a number of position says it."""
 NAMED = 3  # runs that the sentence names
 QUANTITIES = frozenset(
@@ -101,6 +102,12 @@ def share(row: Row) -> float:
     return off / limit if limit > 0.0 and math.isfinite(off) else math.inf
 
 
+def distance(row: Row) -> str:
+    """Say how far a number that is a ratio is off in the unit of its signal; nothing where no place is known."""
+    said = _WHERE.search(row.get("where") or "") if row["unit"] == "1" else None
+    return f"{said[1]} {said[2]}" if said else ""
+
+
 def lacking(row: Row) -> str:
     """Say in few words why a row has no number."""
     if row["verdict"] == Word.SKIPPED:
@@ -133,7 +140,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     right = [run for run in ran if not run.wrong]
     loose = [(run, row) for run in right if (row := run.unbounded)]
     known = [(run, row) for run in right if not run.unbounded and (row := run.deviates)]
-    text = _counted(len(right) - len(known) - len(loose), len(ran), [run.who for run, _ in known])
+    text = _counted(len(right) - len(known) - len(loose), len(ran), [run.who for run, _ in known], bool(off))
     if known:
         most = _largest(known)
         metric = most[0][1]["metric"]
@@ -147,6 +154,8 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     if loose:
         loose.sort(key=lambda one: -share(one[1]))
         text += f" Beyond a limit for a known cause, and not judged: {_named(_caused(loose))}."
+        does = (remedy(run.who, run.rows, row["metric"]) for run, row in loose[:NAMED])
+        text += "".join(f" {one}" for one in dict.fromkeys(does) if one)
     return f"{text}{_known_until(runs)}"
 
 
@@ -183,18 +192,21 @@ def known_until(rows: Iterable[Row], end: float) -> tuple[float, str]:
     return min(found, default=(end, ""))
 
 
-def _counted(within: int, ran: int, known: Sequence[str]) -> str:
-    """How many of the runs are within all limits, and which deviate as expected."""
+def _counted(within: int, ran: int, known: Sequence[str], off: bool) -> str:
+    """How many of the runs are within all limits, which deviate as expected, and that none is outside."""
+    if ran == 1 and not off and not within and not known:
+        return "No number of the run is outside."
     if ran == 1:
         text = f"The run {'is' if within else 'is not'} within all limits"
     else:
         text = f"{within} of {ran} runs {'is' if within == 1 else 'are'} within all limits"
+    none = "" if off or within + len(known) == ran else ", none is outside"
     if not known:
-        return f"{text}."
+        return f"{text}{none}."
     whom = ", ".join(dict.fromkeys(known))
     if ran == 1:
         return f"The run deviates as expected ({whom})."
-    return f"{text}, {len(known)} {'deviates' if len(known) == 1 else 'deviate'} as expected ({whom})."
+    return f"{text}, {len(known)} {'deviates' if len(known) == 1 else 'deviate'} as expected ({whom}){none}."
 
 
 def _part(row: Row) -> str:

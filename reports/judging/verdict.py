@@ -22,6 +22,8 @@ ROUNDING = 1e-12
 """Below this part of what is claimed, or of one unit of the metric, numbers differ between machines."""
 
 LACKS = "The run lacks this number, which the truth has."
+NOT_MEASURED = "Not measured. "
+"""How the reason begins why a part of an error is not known."""
 UNMEASURED = "Known, but its size has not been measured here: "
 """How the reason of a number begins that is beyond its limit, nobody knows how far it may be."""
 IDENTITIES = frozenset(
@@ -83,8 +85,7 @@ class Verdict:
         regression: "kept" or "lost" by that band; empty without one.
         known: what the number is known to, of a part of an error; NaN where nothing is said. One
             below it is none.
-        where: of what the number is and when, in its own unit, where it is beyond its limit and
-            its metric can say so.
+        where: of what the number is, by how much in its own unit, and when, where its metric can say so.
     """
 
     case: str

@@ -7,10 +7,10 @@ A metric is a module with a docstring whose first line says what it measures, an
     measure(truth, run, case)       the number; None where there is none (no contact, another mechanism, ...), NaN where
                                     the run does not show what it needs
 
-and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name; if it can say of
-what the number is, `where(truth, run, case)`, in a few words. What the runs of
-one mechanism alone show is data of its cases (`crossbody.cases.case`). Metrics of a kind stand together as functions
-of one module, named by its UNITS and NEEDS; those of a run alone, (run, case), in `_of_run` and `_of_friction`.
+and, if it needs a signal that an engine may withhold (`crossbody.engines.contract`), NEEDS, its name; a number that can
+say of what it is, which signal and when, is a `crossbody.reports.measuring.placed.Placed`. What the runs of
+one mechanism alone show is data of its cases (`crossbody.cases.case`). Metrics of a kind stand together as functions of
+one module, named by its UNITS and NEEDS; those of a run alone, (run, case), in `_of_run` and `_of_friction`.
 """
 
 from __future__ import annotations

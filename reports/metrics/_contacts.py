@@ -17,6 +17,7 @@ from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.friction import SLOW, guard, rubbing, turned
 from crossbody.reports.measuring.impulse import away, told
 from crossbody.reports.measuring.instants import off
+from crossbody.reports.measuring.placed import Placed, largest, of_rows, placed
 from crossbody.reports.measuring.scale import rounded
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.metrics.position import gap_scale_of
@@ -41,7 +42,7 @@ def constraint_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
     manifold this is its start; its decay is what the law prescribes.
     """
     rows = ~case.law.unilateral
-    return float(np.max(np.abs(run.gap[:, rows]))) if rows.any() else None
+    return largest(np.abs(run.gap[:, rows]), run.t, of_rows(case, "m", "rad", rows)) if rows.any() else None
 
 
 def event_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -54,9 +55,15 @@ def event_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if np.isnan([event.t for event in run.events]).any():
         return math.nan
     pairs = matched(truth, run)
-    shifts = [off(truth, a.touch, b.touch, *_of_row(truth, "gap", a.row, (Mode.FREE,))) for a, b in pairs]
-    shifts += [_let_go(truth, a, b) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+    shifts = [_shift(case, a.row, "touch", _touched(truth, a, b), a.touch) for a, b in pairs]
+    ended = [(a, b) for a, b in pairs if np.isfinite(a.release) and np.isfinite(b.release)]
+    shifts += [_shift(case, a.row, "release", _let_go(truth, a, b), a.release) for a, b in ended]
     return max(shifts, default=None)
+
+
+def _shift(case: Case, row: int, what: str, late: float, t: float) -> Placed:
+    """Return how far an instant of a row is off, s, that is at `t` in the truth."""
+    return placed(late, f"{what} of {case.contacts[row]}", late, "s", t)
 
 
 def _of_row(
@@ -71,6 +78,11 @@ def _of_row(
         lambda motion: np.where(np.isin(motion.mode[:, row], modes), getattr(motion, signal)[:, row], np.inf),
         KNOWN * largest,
     )
+
+
+def _touched(truth: Truth, a: Contact, b: Contact) -> float:
+    """How far a touch is off, s."""
+    return off(truth, a.touch, b.touch, *_of_row(truth, "gap", a.row, (Mode.FREE,)))
 
 
 def _let_go(truth: Truth, a: Contact, b: Contact) -> float:
@@ -92,9 +104,10 @@ def gap_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if not rows.any() or not inside.any():
         return None
     smooth = away(exact, [switch.t for switch in truth.trajectory.switches if not switch.smooth], case.t_end)
-    apart = np.max(np.abs(run.gap[inside] - exact.gap)[smooth][:, rows], axis=0, initial=0.0)
+    apart = np.abs(run.gap[inside] - exact.gap)[smooth][:, rows]
     scale = gap_scale_of(truth, case, rows)
-    return float(np.max(apart / np.where(scale > 0.0, scale, 1.0)))
+    named = of_rows(case, "m", "rad", rows)
+    return largest(apart, run.t[inside][smooth], named, np.where(scale > 0.0, scale, 1.0))
 
 
 def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -110,7 +123,8 @@ def gap_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     some = spread(run)
     wanted = system.gaps_along(run.q[some], 0.0 * run.v[some])[0]
-    return float(np.max(np.abs(run.gap[some] - wanted))) / max(float(np.max(np.abs(wanted))), rounded(run.q[some]))
+    scale = max(float(np.max(np.abs(wanted))), rounded(run.q[some]))
+    return largest(np.abs(run.gap[some] - wanted), run.t[some], of_rows(case, "m", "rad"), scale)
 
 
 def mode_contradicted(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -184,8 +198,10 @@ def mode_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if np.isnan([event.t for event in run.events]).any():
         return math.nan
     pairs = matched(truth, run)
-    shifts = [abs(b.settled - a.settled) for a, b in pairs if np.isfinite(a.settled) and np.isfinite(b.settled)]
-    shifts += [_opened(truth.trajectory, a, b) for a, b in pairs if np.isfinite(a.free) and np.isfinite(b.free)]
+    handed = [(a, b) for a, b in pairs if np.isfinite(a.settled) and np.isfinite(b.settled)]
+    shifts = [_shift(case, a.row, "hand-over", abs(b.settled - a.settled), a.settled) for a, b in handed]
+    freed = [(a, b) for a, b in pairs if np.isfinite(a.free) and np.isfinite(b.free)]
+    shifts += [_shift(case, a.row, "freedom", _opened(truth.trajectory, a, b), a.free) for a, b in freed]
     return max(shifts, default=None)
 
 
@@ -211,7 +227,8 @@ def penetration(truth: Truth, run: Trajectory, case: Case) -> float | None:
     max(0, -gap) over all rows that touch and samples, m.
     """
     rows = case.law.touches
-    return float(np.max(-run.gap[:, rows], initial=0.0)) if rows.any() else None
+    depth = np.maximum(-run.gap[:, rows], 0.0)
+    return largest(depth, run.t, of_rows(case, "m", "rad", rows)) if rows.any() else None
 
 
 def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -226,9 +243,8 @@ def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None
     inside, exact = aligned(truth, run, case)
     if not inside.any():
         return None
-    return (
-        float(np.max(np.abs(np.minimum(run.gap[inside][:, rows], 0.0) - np.minimum(exact.gap[:, rows], 0.0)))) / deepest
-    )
+    apart = np.abs(np.minimum(run.gap[inside][:, rows], 0.0) - np.minimum(exact.gap[:, rows], 0.0))
+    return largest(apart, run.t[inside], of_rows(case, "m", "rad", rows), deepest)
 
 
 def release_count(truth: Truth, run: Trajectory, case: Case) -> float | None:

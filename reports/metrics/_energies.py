@@ -10,12 +10,16 @@ from crossbody.cases import Case, Trajectory
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.equations import equations, finite, spread
 from crossbody.reports.measuring.impulse import away
+from crossbody.reports.measuring.placed import largest, of_rows
 from crossbody.reports.measuring.scale import energy
 from crossbody.reports.measuring.switching import made, parted
 from crossbody.reports.measuring.truth import Truth
 
 UNITS: dict[str, str] = {}
 NEEDS = dict.fromkeys(("contact_work", "energy_integrator", "energy_law", "energy_switching_error"), "ledger")
+
+ENERGY = ("energy", "J")
+KINDS = (("kinetic energy", "J"), ("potential energy", "J"))
 
 
 def contact_work(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -33,7 +37,7 @@ def contact_work(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     off = np.abs(run.ledger.contact[inside] - exact.ledger.contact)[smooth]
-    return float(np.max(off, initial=0.0)) / scale
+    return largest(off, run.t[inside][smooth], of_rows(case, "J", "J"), scale)
 
 
 def energy_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -47,7 +51,8 @@ def energy_drift(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if scale == 0.0 or not inside.any():
         return None
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
-    return float(np.max(np.abs(run.total_energy[inside] - exact.total_energy)[smooth], initial=0.0)) / scale
+    off = np.abs(run.total_energy[inside] - exact.total_energy)[smooth]
+    return largest(off, run.t[inside][smooth], (ENERGY,), scale)
 
 
 def energy_integrator(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -63,7 +68,7 @@ def energy_integrator(truth: Truth, run: Trajectory, case: Case) -> float | None
         return math.nan
     book = run.ledger.input - run.ledger.dissipated + run.ledger.contact.sum(axis=1)
     change = run.total_energy - run.total_energy[0]
-    return float(np.max(np.abs(change - (book - book[0])))) / scale
+    return largest(np.abs(change - (book - book[0])), run.t, (ENERGY,), scale)
 
 
 def energy_law(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -78,7 +83,7 @@ def energy_law(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     if run.ledger is None:
         return math.nan
-    return float(np.max(run.ledger.contact[:, rows].sum(axis=1), initial=0.0)) / scale
+    return largest(np.maximum(run.ledger.contact[:, rows].sum(axis=1), 0.0), run.t, (ENERGY,), scale)
 
 
 def energy_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -97,8 +102,8 @@ def energy_residual(truth: Truth, run: Trajectory, case: Case) -> float | None:
     for row, q, v in zip(wanted, run.q[some], run.v[some], strict=True):
         system.energy(np.array(q), np.array(v), np.array(system.p), row)
     scale = np.max(np.abs(wanted), axis=0)
-    off = np.max(np.abs(run.energy[some] - wanted), axis=0)
-    return float(np.max(off / np.where(scale > 0.0, scale, 1.0)))
+    off = np.abs(run.energy[some] - wanted)
+    return largest(off, run.t[some], KINDS, np.where(scale > 0.0, scale, 1.0))
 
 
 def energy_switching(truth: Truth, run: Trajectory, case: Case) -> float | None:

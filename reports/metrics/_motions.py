@@ -14,6 +14,7 @@ from crossbody.cases.rotations import differences, ways
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.equations import finite
 from crossbody.reports.measuring.impulse import away
+from crossbody.reports.measuring.placed import Placed, largest, of_coordinates
 from crossbody.reports.measuring.scale import least, of_like, scale_of_rates
 from crossbody.reports.measuring.truth import Truth
 
@@ -34,7 +35,7 @@ def angle_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if any(c.unit != "rad" for c in case.coordinates):
         return None
     inside, exact = aligned(truth, run, case)
-    return float(np.max(np.abs(run.q[inside] - exact.q), initial=0.0))
+    return largest(np.abs(run.q[inside] - exact.q), run.t[inside], of_coordinates(case.coordinates))
 
 
 def divergence_time(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -93,9 +94,10 @@ def start_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     return max(_apart(*pair) for pair in pairs if pair[1].shape[1] == len(pair[2]))
 
 
-def _apart(off: Floats, motion: Floats, named: Sequence[Coordinate], rates: bool) -> float:
-    largest = of_like(np.max(np.abs(motion), axis=0, initial=0.0), named)
-    return float(np.max(off / np.maximum(largest, least(named, rates)), initial=0.0))
+def _apart(off: Floats, motion: Floats, named: Sequence[Coordinate], rates: bool) -> Placed:
+    sizes = of_like(np.max(np.abs(motion), axis=0, initial=0.0), named)
+    told = of_coordinates(named, "/s" if rates else "")
+    return largest(off[None], np.zeros(1), told, np.maximum(sizes, least(named, rates)))
 
 
 def velocity(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -111,5 +113,5 @@ def velocity(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return None
     scale = scale_of_rates(truth.trajectory, case)
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
-    off = np.abs(run.v[inside] - exact.v)[smooth] / scale
-    return float(np.max(off, initial=0.0))
+    off = np.abs(run.v[inside] - exact.v)[smooth]
+    return largest(off, run.t[inside][smooth], of_coordinates(case.velocities, "/s"), scale)

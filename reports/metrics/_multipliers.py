@@ -11,6 +11,7 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.impulse import away, before_stops, cumulative, told, true_impulse, with_collisions
+from crossbody.reports.measuring.placed import largest, of_rows
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
 
@@ -31,9 +32,9 @@ def complementarity(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     lam = run.lam[:, rows]
     scale = float(np.max(np.abs(lam), initial=0.0))
-    acting = np.abs(lam[_open(truth, run)[:, rows]])
-    worst = max(float(np.max(-lam, initial=0.0)), float(np.max(acting, initial=0.0)))
-    return worst / scale if scale else 0.0
+    acting = np.where(_open(truth, run)[:, rows], np.abs(lam), 0.0)
+    wrong = np.maximum(np.maximum(-lam, 0.0), acting)
+    return largest(wrong, run.t, of_rows(case, "N", "N m", rows), scale or 1.0)
 
 
 def _open(truth: Truth, run: Trajectory) -> NDArray[np.bool_]:
@@ -58,8 +59,9 @@ def lam_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     inside, exact = aligned(truth, run, case)
     scale = float(np.max(np.abs(exact.lam), initial=0.0))
-    off = float(np.max(np.abs(run.lam[inside] - exact.lam), initial=0.0))
-    return off / max(scale, idle(truth.trajectory)) if scale else None
+    scale = max(scale, idle(truth.trajectory)) if scale else 0.0
+    off = np.abs(run.lam[inside] - exact.lam)
+    return largest(off, run.t[inside], of_rows(case, "N", "N m"), scale) if scale else None
 
 
 def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -79,7 +81,8 @@ def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
     mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
     scale = float(np.max(np.abs(theirs), initial=0.0))
     least = idle(truth.trajectory) * case.t_end
-    return float(np.max(np.abs(mine - theirs))) / max(scale, least) if scale else None
+    off, end = np.abs(mine - theirs)[None], run.t[inside][-1:]
+    return largest(off, end, of_rows(case, "N s", "N m s"), max(scale, least)) if scale else None
 
 
 def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -102,5 +105,7 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
     scale = float(np.max(np.abs(theirs), initial=0.0))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
-    off = float(np.max(np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth], initial=0.0))
-    return off / max(scale, idle(truth.trajectory) * case.t_end) if scale else off or None
+    off = np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth]
+    scale = max(scale, idle(truth.trajectory) * case.t_end) if scale else 0.0
+    found = largest(off, run.t[inside][smooth], of_rows(case, "N s", "N m s"), scale or 1.0)
+    return found if scale else found or None

@@ -10,6 +10,7 @@ import numpy as np
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.case import CaseMetric
 from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.placed import largest, placed
 from crossbody.reports.measuring.truth import Truth
 
 
@@ -45,9 +46,14 @@ class OfCase:
                 return None
             inside, exact = aligned(truth, run, case, releases=self.jumps)
             theirs = own.signal(exact, case)
-            return None if theirs is None else float(np.max(np.abs(values[inside] - theirs), initial=0.0))
+            if theirs is None:
+                return None
+            off = np.abs(values[inside] - theirs)
+            return largest(off.reshape(len(off), -1).max(axis=1, initial=0.0), run.t[inside], [("", own.unit)])
         assert own.instants is not None
         expected, found = own.instants(truth.trajectory, case), own.instants(run, case)
         if len(expected) == 0 or len(expected) != len(found):
             return None
-        return float(np.max(np.abs(found - expected)))
+        off = np.abs(found - expected)
+        at = int(np.argmax(off))
+        return placed(float(off[at]), "instant", float(off[at]), "s", float(expected[at]))

@@ -9,6 +9,7 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.apart import errors
+from crossbody.reports.measuring.placed import Placed, largest
 from crossbody.reports.measuring.scale import RESTS, ROUNDING, scale_of
 from crossbody.reports.measuring.truth import Truth, taken
 
@@ -26,23 +27,17 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     A quaternion is compared by the angle between both, rad, since q and -q are the same rotation. Between samples that
     are further apart than a 200th of the horizon the error is the cubic through both of theirs and of the velocities'.
     """
-    off, _ = _errors(truth, run, case)
-    return float(np.max(off / scale_of(truth.trajectory, case))) if len(off) else None
-
-
-def where(truth: Truth, run: Trajectory, case: Case) -> str:
-    """Say which coordinate the number is of, how far it is off in its own unit, and when."""
-    off, t = _errors(truth, run, case)
-    i, j = np.unravel_index(np.argmax(off / scale_of(truth.trajectory, case)), off.shape)
-    name, unit = case.coordinates[j].name, case.coordinates[j].unit
-    if j in case.quaternions:  # the angle of all four
-        name, unit = name.removesuffix(" qw"), "rad"
-    return f"{name} by {off[i, j]:.2g} {unit} at {t[i]:.3g} s"
-
-
-def _errors(truth: Truth, run: Trajectory, case: Case) -> tuple[Floats, Floats]:
     inside, exact = aligned(truth, run, case)
-    return errors(truth, taken(run, inside), exact, case)
+    off, t = errors(truth, taken(run, inside), exact, case)
+    return _named(off, t, scale_of(truth.trajectory, case), case) if len(off) else None
+
+
+def _named(off: Floats, t: Floats, scale: Floats, case: Case) -> Placed:
+    """Return the largest; the angle of a quaternion by the name of all four."""
+    named = [(one.name, one.unit) for one in case.coordinates]
+    for j in case.quaternions:
+        named[j] = named[j][0].removesuffix(" qw"), "rad"
+    return largest(off, t, named, scale)
 
 
 def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:

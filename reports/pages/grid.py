@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, part_of
-from crossbody.reports.judging.told import FINISHED, WRONG, beyond, lacking, runs_of, share, telling
+from crossbody.reports.judging.told import FINISHED, WRONG, beyond, distance, lacking, runs_of, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
 from crossbody.reports.measuring.truth import TRUTH
@@ -218,7 +218,10 @@ def _value(row: Row, page: str) -> Cell:
     anchor = f"{row['who']}~{row['metric']}"
     text = below + short(value)
     told = lacking(row) if text == "-" else ""
-    return Cell(title=title, word=row["verdict"], text=text, page=page, anchor=anchor, heat=heat_of(row), told=told)
+    small = distance(row) if row["metric"] in KEY else ""
+    return Cell(
+        title=title, word=row["verdict"], text=text, small=small, page=page, anchor=anchor, heat=heat_of(row), told=told
+    )
 
 
 def short(value: float | None) -> str:

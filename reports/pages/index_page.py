@@ -121,7 +121,8 @@ def _sections(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], 
 
 
 def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i: int) -> Section:
-    shown = grid.names(row for rows in found.rows.values() for row in rows)
+    every = [row for rows in found.rows.values() for row in rows]
+    shown = grid.ran(every)
     return Section(
         name="matrix", title="Cases", template="matrix.html",
         context={
@@ -129,9 +130,15 @@ def _matrix(found: Results, cases: Sequence[CaseFiles], names: Sequence[str], i:
             "lines": [_line(found, case, shown) for case in cases], "pages": names, "here": i,
             "cases": len(found.cases), "wide": False, "filtered": len(cases) > 5,
             "says": "Each cell shows how many of its judged rows have its worst verdict, and below, the relative error "
-            "of position and the run time.",
+            "of position and the run time." + _absent(grid.names(every), shown),
         },
     )  # fmt: skip
+
+
+def _absent(asked: Sequence[str], shown: Sequence[str]) -> str:
+    """Say which engines have no column, since they ran on no case; nothing if there are none."""
+    gone = [who.removesuffix(":") for who in asked if who not in shown]
+    return f" Run on no case: {', '.join(gone)}." if gone else ""
 
 
 def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:

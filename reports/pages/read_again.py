@@ -35,6 +35,7 @@ _TILE = re.compile(r'<li class="[^"]*"><strong>(\d+)</strong> ([^<]*)</li>')
 _DATA = re.compile(r'data-(v|name|engine)="([^"]*)"')
 _TAGS = re.compile(r"<[^>]*>")
 _PLACE = re.compile(r" \(([^()]* by [^()]* at [^()]*)\)$")
+_OFF = re.compile(r"by (\S+ \S+) at ")
 _CHIPS = re.compile(r'<p class="counts">(.*?)</p>', re.DOTALL)
 _NUMBER = re.compile(r"(?:< )?(-?(?:\d[\d.]*(?:e[+-]\d+)?|inf))$")
 
@@ -162,7 +163,8 @@ def _of_matrix(tables: Mapping[str, str], runs: Mapping[Run, Sequence[Row]], tim
     """Yield cells of cases and engines that are others."""
     lines = _named(tables, "-matrix")
     heads = [cell.name for cell in lines[1][1]]
-    if set(heads) != {who for _, who in runs}:
+    ran = {who for (_, who), rows in runs.items() if any(row["verdict"] != "skipped" for row in rows)}
+    if set(heads) != (ran or {who for _, who in runs}):
         yield f"its engines, {', '.join(heads)}"
     for _, (first, *cells) in lines[2:]:
         label = next((one for one, _ in runs if first.text.startswith(f"{one} ") or first.text == one), "")
@@ -368,7 +370,9 @@ def _of_glance(tables: Mapping[str, str], runs: Mapping[str, Sequence[Row]], tim
 def _is_value(said: str, row: Row) -> bool:
     """Whether a cell says the verdict of a row and its number, or what that is known to where it is below."""
     value = row["known"] if abs(row["value"]) < row["known"] else row["value"]
-    return said.startswith(row["verdict"]) and _says(said.removeprefix(row["verdict"]).strip(), value + 0.0, 2)
+    off = _OFF.search(row.get("where") or "") if row["unit"] == "1" else None
+    number = said.removeprefix(row["verdict"]).strip().removesuffix(f" {off[1]}" if off else "")
+    return said.startswith(row["verdict"]) and _says(number, value + 0.0, 2)
 
 
 def _of_times(tables: Mapping[str, str], label: str, times: Times) -> Iterator[str]:

@@ -111,6 +111,21 @@ def test_buttons_go_through_what_happens_in_every_engine_that_is_shown_and_end(
     assert browser.complaints() == []
 
 
+@pytest.mark.browser
+@needs_chromium
+def test_real_time_is_one_of_the_speeds_and_all_are_named(page: Path, browser: chromium.Browser) -> None:
+    opened(browser, page)
+    told = browser.js("[...document.querySelector('[data-speed]').options].map((one) => [one.text, Number(one.value)])")
+    assert ["real time", 1] in told
+    paces = [pace for _, pace in told]
+    assert paces == sorted(set(paces))
+    for text, pace in told:
+        times, _, way = text.partition(" × ")
+        if pace != 1:
+            assert float(times) == pytest.approx(max(pace, 1.0 / pace), rel=1e-2)
+            assert way == ("slower" if pace < 1.0 else "faster")
+
+
 PICKED = """(async (name, value) => {
     const field = document.querySelector(`[data-${name}]`);
     field.value = value;

@@ -50,6 +50,14 @@ def test_a_page_begins_with_the_sentence_of_its_own_rows(page: Path) -> None:
     assert "bouncing_ball:linear" not in lead, "which case it is stands above"
 
 
+def test_a_ratio_stands_above_how_far_its_signal_is_off_in_its_own_unit(page: Path) -> None:
+    rows = json.loads((page.parent / "verdicts.json").read_text())["rows"]
+    (row,) = [row for row in rows if row["metric"] == "position" and row["profile"] == "off"]
+    size = row["where"].partition(" by ")[2].partition(" at ")[0]
+    assert size.endswith(" m")
+    assert f"<small>{size}</small>" in page.read_text()
+
+
 def drawn(seed: int) -> list[Row]:
     """Rows of three engines at random, with every word, some beyond a limit that nothing is judged by."""
     rng, words = np.random.default_rng(seed), [word.value for word in Word]

@@ -70,7 +70,7 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
         row("c", "penetration", 1e-3, Word.INFO),  # without a limit
     ]
     text = sentence(runs_of(rows))
-    assert text.startswith("1 of 2 runs is within all limits. Without a limit: c:matched on ball:v.")
+    assert text.startswith("1 of 2 runs is within all limits, none is outside. Without a limit: c:matched on ball:v.")
     assert text.endswith(
         "cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason."
     )
@@ -236,3 +236,10 @@ def test_engines_that_nobody_selected_are_named(capsys: pytest.CaptureFixture[st
     assert said.startswith("Not selected: ")
     assert all(name in said for name in ("dart", "drake", "exudyn", "pymunk"))
     assert not any(name in said for name in DEFAULT_ENGINES)
+
+
+def test_a_dash_of_a_part_says_why_there_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    off = row("mujoco", "position", 2.0, Word.OUTSIDE, 1.0)
+    parts = [row("mujoco", part_of("position", one), math.nan, Word.INFO) for one in ("model", "step")]
+    run_shown.show([off, *(one | {"why": "Not measured. No order."} for one in parts)], {})
+    assert "not measured: model and step of mujoco:matched on ball:v. No order." in capsys.readouterr().out

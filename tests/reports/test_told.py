@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
@@ -12,6 +13,7 @@ from crossbody import cases
 from crossbody.cases.defaults import limits_of
 from crossbody.reports.importers.compare import OK, QUANTITIES, Row
 from crossbody.reports.importers.told import grid
+from crossbody.reports.judging.parts import part_of
 from crossbody.reports.judging.told import NAMED, known_until, runs_of, sentence
 from crossbody.reports.judging.verdict import UNMEASURED, Word
 from crossbody.reports.pages import grid as pages_grid
@@ -74,14 +76,16 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
         why = "no number has a limit" if by["unlimited"] else "no engine has run"
         assert text.startswith(f"Nothing is judged, since {why}.")
         return
-    count = re.match(r"(\d+) of (\d+) runs (is|are) within all limits|The run (is not|is|deviates) ", text)
+    begins = r"(\d+) of (\d+) runs (is|are) within all limits|The run (is not|is|deviates) |(No number of the run)"
+    count = re.match(begins, text)
     assert count
     if judged == 1:
         said = "is" if by["within"] else "deviates" if by["expected"] else "is not"
-        assert count[4] == said
+        assert count[5] if by["unbounded"] else count[4] == said
     else:
         assert (int(count[1]), int(count[2])) == (len(by["within"]), judged)
         assert count[3] == ("is" if len(by["within"]) == 1 else "are")
+        assert ("none is outside" in text) == (bool(by["unbounded"]) and not by["outside"])
     deviating = re.search(r"(\d+|The run) deviates? as expected \((.*?)\)", text)
     assert (deviating[2].split(", ") if deviating else []) == by["expected"]
     assert not deviating or deviating[1] in ("The run", str(len(by["expected"])))
@@ -194,3 +198,30 @@ def test_the_sentence_ends_with_a_whole_clause_of_a_known_cause(name: str) -> No
         finished, *others = rows_of("ball:hard", "expected", 20.0)
         said = sentence(runs_of([finished, *(one | {"why": cause} for one in others)])).removesuffix(".").split()
         assert said[-1] not in ("a", "an", "and", "but", "for", "in", "model", "of", "or", "the", "with"), said
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"model": (1e-6, 2e-4), "step": (1.7e-3, 2e-4)},
+         "step 100 %, model below 11.8 %; a shorter step (--set-engine e.dt=0.0005) makes it smaller."),
+        ({"importer": (0.0, 1e-12), "model": (1.6e-3, 1e-9), "step": (1e-4, 1e-9)},
+         "model 94.1 %, step 5.88 %; no shorter step makes it smaller"),
+        ({"importer": (1.7e-3, 1e-12), "model": (0.0, 1e-9)}, "importer 100 %; the engine reads the file"),
+        ({"model": (math.nan, math.nan), "step": (None, None)}, "is not known: if a shorter step"),
+    ],
+)  # fmt: skip
+def test_a_run_beyond_its_limit_is_told_what_makes_its_error_smaller(
+    parts: dict[str, tuple[float | None, float | None]], said: str
+) -> None:
+    off = row("e:p", Word.INFO, value=1.7e-3, why="Known, but its size has not been measured here: steps")
+    rows = [off | {"settings": "dt=0.002 solver=NEWTON"}]
+    rows += [
+        row("e:p", Word.INFO, part_of("position", part), value=value, known=known, limit=math.nan)
+        for part, (value, known) in parts.items()
+    ]
+    text = sentence(runs_of(rows))
+    assert said in text
+    assert text.startswith("No number of the run is outside. Beyond a limit")
+    without = sentence(runs_of([rows[0] | {"settings": "tol=1e-9"}, *rows[1:]]))
+    assert "makes it smaller" not in without

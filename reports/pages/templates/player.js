@@ -366,9 +366,10 @@
 
     if (follow && moving.length) follow.checked = Math.hypot(...across(range)) > FAR * Math.hypot(...across(standing(0)));
     const usual = nice((end || 1) / 10);
-    for (const factor of [0.01, 0.1, 0.2, 0.5, 1, 2, 5]) {
-      const option = new Option(`${shortNumber(usual * factor)} × real time`, usual * factor, factor === 1, factor === 1);
-      speed.append(option);
+    const paces = [0.01, 0.1, 0.2, 0.5, 1, 2, 5].map((factor) => usual * factor);
+    const paced = (pace) => (pace === 1 ? "real time" : pace < 1 ? `${shortNumber(1 / pace)} × slower` : `${shortNumber(pace)} × faster`);
+    for (const pace of [...new Set([...paces, 1])].sort((a, b) => a - b)) {
+      speed.append(new Option(paced(pace), pace, pace === usual, pace === usual));
     }
     play.addEventListener("click", () => run(!running));
     clock.addEventListener("input", () => seek((clock.value / 1000) * end, true));
