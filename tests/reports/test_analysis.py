@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 
 import numpy as np
@@ -29,6 +30,7 @@ from crossbody.reference.sundials.equations import Equations
 from crossbody.reports.analysis import numbers
 from crossbody.reports.analysis import places as analyse
 from crossbody.reports.analysis.loci import Family, limits
+from crossbody.reports.analysis.summary import over
 
 RNG = np.random.default_rng(27)
 LAW = RowLaw(a0=1e4, a1=50.0)
@@ -341,6 +343,9 @@ def test_where_a_gain_makes_an_equilibrium_unstable():
     poles = family.model(1, float(rows.loc["left finger", "value"])).poles()
     crossing = poles[np.argmin(np.abs(poles - 1j * rows.loc["left finger", "frequency"]))]
     assert abs(crossing.real) < 1e-6 * abs(crossing)
+    told = over("kstar", (500.0, 800.0), rows.reset_index())
+    assert told == "Unstable above kstar = 595.376: left finger, right finger."
+    assert over("kstar", (1.0, 2.0), rows[:0]) == "Nothing gains or loses its stability over kstar = 1 .. 2."
 
 
 def test_the_models_are_read_by_scipy_and_by_python_control():
@@ -390,7 +395,13 @@ def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
     assert "on the floor" in capsys.readouterr().out
     rows = json.loads((out / "analysis-locus.json").read_text())["rows"]
     assert {row["branch"] for row in rows} == {0, 1}
-    assert (out / "index.html").is_file()
+    page = (out / "index.html").read_text()
+    assert "Equilibria and linear models of bouncing_ball:linear" in page
+    (told,) = json.loads((out / "analysis-says.json").read_text())["rows"]
+    assert told["says"].startswith(
+        "Nothing gains or loses its stability over a1 = 0 .. 300. bouncing_ball:linear, on the"
+    )
+    assert told["says"] in html.unescape(page)
     with pytest.raises(UnknownName, match="place"):
         command("bouncing_ball", "linear", [], ["x=1"], locus=None, **common)
     with pytest.raises(CaseUnsupported, match="workspace"):
