@@ -120,7 +120,7 @@ def test_real_time_is_one_of_the_speeds_and_all_are_named(page: Path, browser: c
     paces = [pace for _, pace in told]
     assert paces == sorted(set(paces))
     for text, pace in told:
-        times, _, way = text.partition(" \N{MULTIPLICATION SIGN} ")
+        times, _, way = text.split(" ", 2)
         if pace != 1:
             assert float(times) == pytest.approx(max(pace, 1.0 / pace), rel=1e-2)
             assert way == ("slower" if pace < 1.0 else "faster")
