@@ -28,6 +28,7 @@ from crossbody.reports.judging.forces_of_scene import forces_of_scene
 from crossbody.reports.judging.reach import BUDGET, estimated
 from crossbody.reports.judging.run_verdicts import Entry, crash
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
+from crossbody.reports.judging.units_of_scene import units_of_scene
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.choice import Pick, check_known, of_case, of_pick, offered
@@ -221,6 +222,7 @@ def _ran(
     own = {name: value for name, value in asked.items() if name in prepared.settings}
     rows += settings_kept(shown, prepared.settings)
     rows += forces_of_scene(case)
+    rows += units_of_scene(case)
     if case.file:
         from crossbody.reports.judging.start_of_file import start_of_file  # parsers that other cases do without
 
