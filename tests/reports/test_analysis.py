@@ -370,12 +370,32 @@ def test_every_place_of_a_case_is_an_equilibrium(name, variant):
         assert not place.trim.pulling
 
 
+ROD = Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("limits", "turns", "found"),
+    [((-np.inf, np.inf), 0, (0.0, np.pi)), ((-2.6, 2.6), 0, (0.0,)), ((-np.inf, np.inf), 3, (0.0, np.pi))],
+)
+def test_equilibria_are_looked_for_all_along_a_motion_and_inside_of_its_bounds(limits, turns, found):
+    """Of a rod that falls from near its highest place: upright, if no bound is before, and hanging."""
+    hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0), range=limits, law=LAW)
+    start = 2.5 + 2.0 * np.pi * turns
+    case = cases.from_scene(Scene(bodies=(ROD,), joints=(hinge,)), q0=[start], t_end=3.0)
+    places = [place for place in analyse.places(case) if place.name.startswith("touching nothing")]
+    assert sorted(float(place.trim.q[0]) - 2.0 * np.pi * turns for place in places) == pytest.approx(found, abs=1e-9)
+    assert all(abs(place.trim.q[0] - start) <= np.pi for place in places)
+    rates = {round(float(place.trim.q[0]) / np.pi) % 2: place.model.poles().real.max() for place in places}
+    own = np.sqrt(9.81 * 0.5 / (0.1 + 0.25))
+    assert rates.get(1, own) == pytest.approx(own, rel=1e-9)
+    assert rates[0] == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize(("low", "stands"), [(-0.2, False), (0.3, True)])
 def test_where_a_row_would_have_to_pull_there_is_no_equilibrium(low, stands):
     """A rod that hangs swings against a bound: only one beyond the lowest place holds it."""
-    rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
     hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0), range=(low, 2.0), law=LAW)
-    case = cases.from_scene(Scene(bodies=(rod,), joints=(hinge,)), q0=[0.8], t_end=2.0)
+    case = cases.from_scene(Scene(bodies=(ROD,), joints=(hinge,)), q0=[0.8], t_end=2.0)
     (touches,) = (place for place in analyse.places(case) if place.name == "touching hinge low")
     assert (touches.model is not None) == stands
     assert touches.why == (
