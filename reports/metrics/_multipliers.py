@@ -10,9 +10,17 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.impulse import away, before_stops, cumulative, told, true_impulse, with_collisions
+from crossbody.reports.measuring.friction import directed, rubbing
+from crossbody.reports.measuring.impulse import (
+    away,
+    before_stops,
+    cumulative,
+    told,
+    true_impulse,
+    with_collisions,
+)
 from crossbody.reports.measuring.scale import idle
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth, before
 
 UNITS: dict[str, str] = {}
 NEEDS = dict.fromkeys(("complementarity", "lam_error", "lam_impulse", "lam_impulse_path"), "lam")
@@ -22,17 +30,19 @@ def complementarity(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """How far the multipliers pull, or act where nothing touches, over the largest.
 
     Max of -lam and of |lam| where they are open, of rows that touch, over max |lam|; NaN where lam is not known. Rows
-    of friction push either way. Recomputed from lam, gap and mode, never an engine's own flag.
+    of friction push either way. Samples are left out at which friction of a slip may have any direction. Recomputed
+    from lam, gap and mode, never an engine's own flag.
     """
     rows = case.law.touches
     if not rows.any():
         return None
     if told(run) is None:
         return math.nan
-    lam = run.lam[:, rows]
+    lam, rubs = run.lam[:, rows], rubbing(run, case)
+    known = np.ones(len(run.t), dtype=bool) if rubs is None else directed(run, rubs)
     scale = float(np.max(np.abs(lam), initial=0.0))
-    acting = np.abs(lam[_open(truth, run)[:, rows]])
-    worst = max(float(np.max(-lam, initial=0.0)), float(np.max(acting, initial=0.0)))
+    acting = np.abs(lam[_open(truth, run)[:, rows] & known[:, None]])
+    worst = max(float(np.max(-lam[known], initial=0.0)), float(np.max(acting, initial=0.0)))
     return worst / scale if scale else 0.0
 
 
@@ -90,8 +100,9 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
     its step. At the instant at which a slip stops its friction may have any direction: the sample before counts
     there. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
     known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
-    many; N s where only the run's does.
+    many; N s where only the run's does. Nothing is compared behind where slips are too slow to tell their friction.
     """
+    run = before(run, truth.firm) if truth.firm < math.inf else run
     inside, exact = aligned(truth, run, case, releases=True)
     if not inside.any() or truth.trajectory.counts.get("redundant", 0):
         return None
