@@ -22,7 +22,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reference import System
 from crossbody.reports.measuring.equations import equations, finite, spread
-from crossbody.reports.measuring.friction import off_bound
+from crossbody.reports.measuring.friction import directed, off_bound, rubbing
 from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
@@ -144,6 +144,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         inputs = system.activations.extended(inputs)
     if inputs is not None:  # where they jump, a sample does not say on which side it stands
         looked &= ~np.isin(run.t, inputs.times)
+    if (rubs := rubbing(run, case)) is not None:
+        looked &= directed(run, rubs)
     looked &= ~np.isin(run.t, [switch.t for switch in run.switches])  # nor where the curvature of a gap jumps
     worst, scale = off_bound(run, case), 0.0
     slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
