@@ -27,6 +27,7 @@ from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.forces_of_scene import forces_of_scene
 from crossbody.reports.judging.reach import BUDGET, estimated
 from crossbody.reports.judging.run_verdicts import Entry, crash
+from crossbody.reports.judging.steps_taken import runaway
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.judging.units_of_scene import units_of_scene
 from crossbody.reports.measuring.truth import Truth, sample_times
@@ -216,6 +217,9 @@ def _ran(
         raise CaseUnsupported(dear)
     bounded = _bounded(case, pick)
     prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
+    if why := runaway(case, prepared.settings, lambda first, more: prepare(first, pick, {**asked, **more})):
+        short = replace(of_start(case, why), outcome=Outcome.STEP_LIMIT)
+        return Entry(engine=pick.engine, profile=pick.profile, settings=prepared.settings, run=short)
     shown = _of_engine(pick, "audit", prepared.audit(), Mapping, "a mapping")  # type: ignore[type-abstract]
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
