@@ -262,10 +262,15 @@ def release_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 
 def _light(truth: Truth, run: Trajectory, a: Contact, b: Contact) -> bool:
-    """Whether what ended in one motion alone bears no more there and here than is known, as in `event_times`."""
+    """Whether what ended in one motion alone bears no more there and here than is known, as in `event_times`.
+
+    The other one goes on, closed: else it has lost an event.
+    """
     lam, known = _of_row(truth, "lam", a.row, CLOSED)
-    for motion in (truth.trajectory, run):
+    for motion, one in ((truth.trajectory, a), (run, b)):
         behind = (motion.t >= min(a.release, b.release)) & np.isin(motion.mode[:, a.row], CLOSED)
+        if not np.isfinite(one.release) and not behind.any():
+            return False
         if not np.max(np.abs(lam(motion)[behind]), initial=0.0) <= truth.grows * known:
             return False
     return True

@@ -218,8 +218,8 @@ def _ran(
     bounded = _bounded(case, pick)
     prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
     if why := runaway(case, prepared.settings, lambda first, more: prepare(first, pick, {**asked, **more})):
-        short = replace(of_start(case, why), outcome=Outcome.STEP_LIMIT)
-        return Entry(engine=pick.engine, profile=pick.profile, settings=prepared.settings, run=short)
+        stopped = replace(of_start(case, why), outcome=Outcome.STEP_LIMIT)
+        return Entry(engine=pick.engine, profile=pick.profile, settings=prepared.settings, run=stopped)
     shown = _of_engine(pick, "audit", prepared.audit(), Mapping, "a mapping")  # type: ignore[type-abstract]
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
