@@ -268,7 +268,7 @@ def _light(truth: Truth, run: Trajectory, a: Contact, b: Contact) -> bool:
     """
     lam, known = _of_row(truth, "lam", a.row, CLOSED)
     for motion, one in ((truth.trajectory, a), (run, b)):
-        behind = (motion.t >= min(a.release, b.release)) & np.isin(motion.mode[:, a.row], CLOSED)
+        behind = (motion.t > min(a.release, b.release)) & np.isin(motion.mode[:, a.row], CLOSED)
         if not np.isfinite(one.release) and not behind.any():
             return False
         if not np.max(np.abs(lam(motion)[behind]), initial=0.0) <= truth.grows * known:
