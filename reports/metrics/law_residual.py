@@ -144,12 +144,12 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
         inputs = system.activations.extended(inputs)
     if inputs is not None:  # where they jump, a sample does not say on which side it stands
         looked &= ~np.isin(run.t, inputs.times)
-    if (rubs := rubbing(run, case)) is not None:
-        looked &= directed(run, rubs)
     looked &= ~np.isin(run.t, [switch.t for switch in run.switches])  # nor where the curvature of a gap jumps
     worst, scale = off_bound(run, case), 0.0
     slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
     chosen = spread(run, looked)
+    if (rubs := rubbing(run, case)) is not None:
+        chosen = chosen[directed(run, rubs)[chosen]]
     patterns, which = np.unique(
         np.stack([closed & ~slides, slides, run.mode == Mode.COLLISION], axis=1)[chosen], axis=0, return_inverse=True
     )
