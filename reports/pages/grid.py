@@ -167,9 +167,21 @@ def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, floa
 
 
 def ran(rows: Sequence[Row]) -> list[str]:
-    """Return the engines that have a number in some row; all where none has."""
-    skipped = {row["who"] for row in rows} - {row["who"] for row in rows if row["verdict"] != Word.SKIPPED}
-    return [who for who in names(rows) if who not in skipped] or names(rows)
+    """Return the engines that have a number in some row, those first that are off; all where none has."""
+    order, mine = names(rows), by(rows, "who")
+    rank = {who: _rank(mine[who]) for who in order}
+    group = {who: who.partition(":")[0] for who in order}
+    first = {engine: min(rank[who] for who in order if group[who] == engine) for engine in group.values()}
+    order.sort(key=lambda who: (group[who] == TRUTH, first[group[who]]))
+    shown = [who for who in order if any(row["verdict"] != Word.SKIPPED for row in mine[who])] or order
+    places = {engine: k for k, engine in enumerate(dict.fromkeys(group[who] for who in shown))}
+    return sorted(shown, key=lambda who: (places[group[who]], rank[who]))
+
+
+def _rank(rows: Sequence[Row]) -> int:
+    """Return how bad the worst word of some rows is, 0 the worst."""
+    word = worst(rows)[0]
+    return RANKED.index(word) if word in RANKED else len(RANKED)
 
 
 def _none(who: str) -> Cell:

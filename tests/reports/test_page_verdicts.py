@@ -18,7 +18,7 @@ from crossbody.cases import load
 from crossbody.reports.judging.told import beyond, runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Word
-from crossbody.reports.pages import case_page
+from crossbody.reports.pages import case_page, grid
 from crossbody.reports.pages.html import BEYOND
 
 needs_chromium = pytest.mark.skipif(
@@ -143,3 +143,28 @@ def test_the_picture_is_on_the_first_screen(page: Path, browser: chromium.Browse
     bottom = browser.js("document.querySelector('.player canvas').getBoundingClientRect().bottom")
     assert bottom <= height
     assert browser.js("document.querySelector('[data-play]').getBoundingClientRect().bottom") <= height
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_columns_begin_with_the_engines_that_are_off(seed: int) -> None:
+    rows = [row | {"engine": row["who"].partition(":")[0]} for row in drawn(seed)]
+    rows = [row for row in rows if row["verdict"] in (*OFF, "within", "skipped")]
+    shown = grid.ran(rows)
+    worst = [min(map(RANK.index, {row["verdict"] for row in rows if row["who"] == who} - {"skipped"})) for who in shown]
+    assert worst == sorted(worst)
+    assert set(shown) == {row["who"] for row in rows if row["verdict"] != "skipped"}
+
+
+def test_profiles_of_an_engine_stay_side_by_side_behind_the_truth_is_nothing() -> None:
+    words = {
+        "a:good": "within",
+        "b:bad": "outside",
+        "a:odd": "expected-outside",
+        "b:good": "within",
+        "truth:": "within",
+    }
+    rows = [{"who": who, "verdict": word, "limit": 1.0, "value": 0.5, "expected": None} for who, word in words.items()]
+    assert grid.ran(rows) == ["b:bad", "b:good", "a:odd", "a:good", "truth:"]
+
+
+RANK = ("crashed", "outside", "expected-outside", "within")
