@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from crossbody.reports import metrics
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import FINISHED, WRONG, beyond, distance, lacking, runs_of, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
@@ -69,7 +70,7 @@ class Cell:
 class Line:
     """One line: its name, what stands beside it, the page that it leads to, a cell for every engine, and a sketch.
 
-    The sketch is a line of points in a box of 100 by 20, as SVG writes them.
+    The sketch is a line of points in a box of 100 by 20, as SVG writes them. The title says what the line means.
     """
 
     text: str
@@ -77,6 +78,7 @@ class Line:
     small: str = ""
     page: str = ""
     sketch: str = ""
+    title: str = ""
 
 
 def heads(engines: Sequence[str]) -> list[dict[str, Any]]:
@@ -208,10 +210,16 @@ def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Se
         Line(
             text=name,
             small=units[name],
+            title=_meaning(name),
             cells=[_value(values[who][name], page) if name in values[who] else _none(who) for who in engines],
         )
         for name in order
     ]
+
+
+def _meaning(metric: str) -> str:
+    """Say what a metric measures; nothing of those that a case brings along, and of parts of errors."""
+    return metrics.summary(metric) if metric in metrics.names() else ""
 
 
 def _urgent(row: Row) -> tuple[Any, ...]:
