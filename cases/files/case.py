@@ -309,8 +309,8 @@ def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
 AS_IT_STANDS = (
     Limit(
         metric="*", engine="mujoco", profile="as_is", covers_none=True,
-        known="MuJoCo's step, integrator and soft rows, those of the file where it has some: "
-        "the parts of its error show the effect of each",
+        known="MuJoCo's step, integrator and soft rows, those of the file where it has some: the parts of its error "
+        "show the effect of each",
     ),
     Limit(
         metric="event_gap", value=1.0, engine="mujoco", profile="as_is", covers_none=True,

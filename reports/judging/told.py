@@ -20,7 +20,7 @@ SHORT = re.compile(r"(?:Followed|Known up) to (.*? s)(?: of .*? s)?: (.*?)\.(?: 
 FINISHED = "finished"  # the row that says whether a run came to its end
 _CLAUSE = re.compile(r"[:;.](?:\s|$)")
 """What ends the first statement of a reason; a comma does not, which stands in lists."""
-_WHERE = re.compile(r"\bby (\S+) (\S+) at ")
+_WHERE = re.compile(r"\bby (\S+) (\S.*?) at ")
 """How far a coordinate is off, and its unit, as a number of position says it."""
 NAMED = 3  # runs that the sentence names
 QUANTITIES = frozenset(

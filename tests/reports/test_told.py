@@ -91,8 +91,9 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
     assert not deviating or deviating[1] in ("The run", str(len(by["expected"])))
     if most := max(by["expected"], key=times.__getitem__, default=None):
         size = f"position {times[most] * 1e-3:.2g}, {times[most]:.2g} times its limit"
-        said = f"The largest deviation of position: {most} on ball:hard ({size}): Soft contacts, of a step. "
-        assert said in f"{text} "
+        assert (
+            f"The largest deviation of position: {most} on ball:hard ({size}): Soft contacts, of a step. " in f"{text} "
+        )
     for kind, begin in (("outside", "Off:"), ("unbounded", "Beyond a limit for a known cause, and not judged:")):
         farthest = sorted(by[kind], key=lambda who: -times[who])
         assert named(text, begin) == (farthest[:NAMED], max(len(farthest) - NAMED, 0))
