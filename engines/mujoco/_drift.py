@@ -1,4 +1,4 @@
-"""H' v of contacts, strings and bounds of ball joints, which MuJoCo leaves out.
+"""H' v of contacts, strings, bounds of ball joints and curved couplings, which MuJoCo leaves out.
 
 It has J v' = -a1 h' - a0 h there, where the law has h'' = H v' + H' v.
 
@@ -14,9 +14,9 @@ import mujoco
 import numpy as np
 
 from crossbody.cases.arrays import Floats
-from crossbody.cases.scene import Joint, Scene, Tendon
+from crossbody.cases.scene import Joint, Scene, Tendon, Vector
 from crossbody.engines._contacts import TURN, Contacts, Flat, Indices, closing, drift, flat
-from crossbody.engines._scene import angle_of, places
+from crossbody.engines._scene import angle_of, derivatives, horner, places
 from crossbody.engines.mujoco._scene import numbers, pose_of
 from crossbody.engines.nearest import Pose, cross
 
@@ -111,6 +111,35 @@ class Drift:
             return 0.0
         first, turn = self.place[joint.name], angle_of(self.data.qpos[self.at[joint.name] :][:4])
         return float(turn @ v[first : first + 3] / np.linalg.norm(turn))
+
+
+class Couplings:
+    """H' v of joints and tendons that follow another by a polynomial from the square on.
+
+    Attributes:
+        curved: of each its row, where its leader is and how fast, in MjData's vectors, where it rests, and the second
+            derivative of the polynomial.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        at, place = places(scene)
+        tendons, rests = [one.name for one in scene.tendons], {one.name: one.reference for one in scene.joints}
+        self.curved: list[tuple[int, str, str, int, int, float, Vector]] = []
+        row = 0
+        for loop in scene.loops:
+            name, curve = loop.second, derivatives(loop.polynomial)[2]
+            if not loop.in_space and name and any(loop.polynomial[2:]):
+                if loop.type == "tendon":
+                    i, rest = tendons.index(name), scene.rest_length(scene.tendons[tendons.index(name)])
+                    self.curved.append((row, "ten_length", "ten_velocity", i, i, rest, curve))
+                else:
+                    self.curved.append((row, "qpos", "qvel", at[name], place[name], rests[name], curve))
+            row += loop.width
+
+    def add(self, data: Any) -> None:
+        """Take it off the reference accelerations of the rows, at a state that is evaluated up to its forces."""
+        for row, where, rate, i, j, rest, curve in self.curved:
+            data.efc_aref[row] += horner(curve, getattr(data, where)[i] - rest) * getattr(data, rate)[j] ** 2
 
 
 def carried(model: Any, body: int) -> Floats:

@@ -400,7 +400,8 @@ def _audit(case: Case, profile: str, scene: Scene, model: Any, rows: Rows) -> di
         case = _reading(case, rows)
     if isinstance(rows, Switched) and isinstance(of_run, Switched):
         rows.surface[:] = of_run.surface
-    hook = _hook(case, data, rows if entered and isinstance(rows, Switched) else None, None)
+    laid = rows if isinstance(rows, Switched) and (entered or rows.nc == rows.always) else None
+    hook = _hook(case, data, laid, None)
 
     def look(q: Floats, v: Floats) -> None:
         if isinstance(rows, Switched) and entered:

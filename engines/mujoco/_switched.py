@@ -22,7 +22,7 @@ from crossbody.engines._level_machine import EPS
 from crossbody.engines._log import Modes
 from crossbody.engines._machines import elastic_part
 from crossbody.engines.mujoco._build import solref_of
-from crossbody.engines.mujoco._drift import Drift
+from crossbody.engines.mujoco._drift import Couplings, Drift
 from crossbody.engines.mujoco._rows import LIMITS, Present, Rows
 from crossbody.engines.mujoco._scene import Hook, constraint_jacobian
 
@@ -76,7 +76,7 @@ class Switched(Rows):
         self.surface, self.wanted, self.last = np.zeros((3, self.nc))
         self.converged = float(model.opt.tolerance)
         self.surface[self.always :] = [margin[i] for margin, i in self.part]
-        self.quiet = not self.touching.count
+        self.quiet, self.couplings = not self.touching.count, Couplings(scene)
         self.contact = np.arange(self.nc) >= self.nc - self.touching.count
         self.free: Modes = (BILATERAL,) * self.always + (FREE,) * (self.nc - self.always)
         self.armed = self.free
@@ -126,7 +126,7 @@ class Switched(Rows):
     @property
     def wakeful(self) -> bool:
         """Whether the hook has something to do while all rows are free."""
-        return not self.quiet or bool(self.cubic[: self.always].any())
+        return not self.quiet or bool(self.cubic[: self.always].any()) or bool(self.couplings.curved)
 
     def _gaps(self) -> list[float]:
         """Return the gaps of all rows that open, m or rad, each of which is a bound."""
@@ -231,8 +231,9 @@ class Switched(Rows):
         joints, tendons = self.scene.joints, self.scene.tendons
         bent = {(int(LIMITS[0]), i): i for i, joint in enumerate(joints) if joint.type == "ball" and joint.limited}
         bent |= {(int(LIMITS[1]), i): len(joints) + i for i, tendon in enumerate(tendons) if tendon.bodies}
+        couple = self.couplings.add if self.couplings.curved else None
         if self.nc == self.always and not self.cubic.any():
-            return None
+            return None if couple is None else lambda model, data: couple(data)
         drift, curved = Drift(self.scene, self.model, self.touching), self.cubic[: self.always]
         laid = lru_cache(LAYOUTS)(lambda present, armed: self._laid(present, armed, bent))
         option = self.model.opt  # to ask for it costs more than to set a number in it
@@ -249,6 +250,8 @@ class Switched(Rows):
 
         def hook(model: Any, data: Any) -> None:
             aref = data.efc_aref
+            if couple is not None:
+                couple(data)
             if bends and self.nc == 1:
                 return one(data, 0, 0)
             if bends:

@@ -135,6 +135,10 @@ def _poles() -> Iterator[Asked]:
     found = bode.poles([bode.Curve(mode="grasp", kstar=5.0, model=model)])
     yield "poles", "a diagonal model", float(len(found)), 4.0
     yield "growth", "a diagonal model with two poles at rest", float(bode.growths(found)["growth"].iloc[0]), -0.2
+    for damping in (0.6, -0.6):
+        for row in _rows(numbers.poles([_place(_model(damping=damping, stiffness=9.0))])):
+            yield "real", f"a damping of {damping:g} 1/s", row["real"], -0.5 * damping
+            yield "damping", f"a damping of {damping:g} 1/s", row["damping"], damping / 6.0
 
 
 @dataclass

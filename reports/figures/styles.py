@@ -85,6 +85,12 @@ def plain(text: str) -> str:
     return text.replace("<", "&lt;")
 
 
+def single(values: Floats) -> NDArray[np.float32]:
+    """Return values in single precision; what is larger than any plot shows is infinite, a gap."""
+    with np.errstate(over="ignore"):
+        return values.astype(np.float32)
+
+
 def coded(array: Floats | NDArray[np.float32]) -> dict[str, str]:
     """An array as plotly reads it from base64 ("typed array specification")."""
     text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()

@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from crossbody.cases import Mode, Outcome, Trajectory
 from crossbody.cases.arrays import Floats
@@ -55,12 +56,14 @@ def _system(a0: float, a1: float, a2: float, opens: bool = False) -> System:
     return found
 
 
-def _run(system: System, start: tuple[float, float], t: Floats, rtol: float, implicit: bool) -> Trajectory:
-    """Return a motion at instants t (n,), by explicit steps, or but for the first by implicit ones."""
+def stepped(
+    system: System, start: tuple[ArrayLike, ArrayLike], t: Floats, rtol: float, implicit: bool
+) -> Trajectory:  # fmt: skip
+    """Return a motion from q0 and v0 at instants t (n,), by explicit steps, or but for the first by implicit ones."""
     options = Options(
         t_end=t[-1], rtol=rtol, samples=t, ledger=True, consistent=False, shortcuts=False, implicit=implicit
     )  # fmt: skip
-    run = prepare(system, [start[0]], [start[1]], options)
+    run = prepare(system, *start, options)
     run.start()
     run.slice(1)
     if implicit:
@@ -120,7 +123,7 @@ def _cubic() -> Iterator[Found]:
     for name, implicit, order, tolerances in (
         ("explicit", False, 8.0, (LOOSE, TIGHT)), ("implicit", True, 4.0, (LOOSER, TIGHTER)),
     ):  # fmt: skip
-        runs = [_run(system, (q0, 0.0), t, rtol, implicit) for rtol in tolerances]
+        runs = [stepped(system, ([q0], [0.0]), t, rtol, implicit) for rtol in tolerances]
         for run, rtol in zip(runs, tolerances, strict=True):
             yield from _returns(name, run, spring, rtol, MANY if implicit else FEW)
             yield from _account(name, run, rtol, (OF_WORK if implicit else FEW) * rtol)

@@ -310,7 +310,7 @@ def _moving(run: Trajectory) -> float:
 def _impulses(plain: Plain, least: float) -> Iterator[Control]:
     """Put all impulses off; where rows carry less than `least`, N, let one carry what moves the mechanism."""
     run, seen = plain.run, ("lam_impulse_path", "lam_impulse")
-    if float(np.max(np.abs(np.trapezoid(run.lam, run.t, axis=0)), initial=0.0)) < least * float(np.ptp(run.t)):
+    if not _carries(run, least):
         pressed = _pressed(run, least / WEAK)
         yield Control(fault=f"a row presses by {least / WEAK:.3g} more", run=pressed, sees=dict.fromkeys(seen, LARGE))
         return
@@ -320,6 +320,11 @@ def _impulses(plain: Plain, least: float) -> Iterator[Control]:
             fault=f"multipliers and impulses {said}", run=replace(run, lam=times * run.lam, events=events),
             sees=dict.fromkeys(seen, roughly(1.0)),
         )  # fmt: skip
+
+
+def _carries(run: Trajectory, least: float) -> bool:
+    """Whether the impulse of a row is that of a force, N, that acts throughout, or more: errors are measured by it."""
+    return float(np.max(np.abs(np.trapezoid(run.lam, run.t, axis=0)), initial=0.0)) >= least * float(np.ptp(run.t))
 
 
 LARGE = (1.0 / ROUGH, np.inf)
@@ -597,6 +602,8 @@ def clocks(plain: Plain) -> Iterator[Control]:
     )
     sees = dict.fromkeys(("position", "velocity", "gap_error"), (0.0, TINY))
     if rubs:
+        if not _carries(run, WEAK * _moving(run)):
+            return
         sees = {"lam_impulse_path": exactly(_apart(run, other))}
     yield Control(fault="another clock between events", run=other, sees=sees, wrong=False)
 

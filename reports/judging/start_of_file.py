@@ -31,7 +31,8 @@ def start_of_file(case: Case) -> tuple[AuditRow, ...]:
     if not case.file or case.scene is None:
         return ()
     key = _key(case)
-    return (*(_start(case, key) if key is not None else ()), *_as_asked(case), *_pushes(case), *_table(case))
+    start = _start(case, key) if key is not None else ()
+    return (*start, *_as_asked(case), *_laws(case), *_pushes(case), *_table(case))
 
 
 def _key(case: Case) -> Mapping[str, str] | None:
@@ -102,6 +103,13 @@ def _as_asked(case: Case) -> Iterator[AuditRow]:
         if (asked := _asked(case, name)) and not case.parameters.get("assemble"):
             at, wanted = zip(*asked, strict=True)
             yield _row(f"{name} as asked", start[list(at)], np.array(wanted))
+
+
+def _laws(case: Case) -> Iterator[AuditRow]:
+    """Yield the constants of all rows that were asked for, and those of the case; friction holds no place, by no a0."""
+    for name, mine in (("a0", case.law.a0[case.law.touches | ~case.law.unilateral]), ("a1", case.law.a1)):
+        if (asked := float(case.parameters.get(name, -1.0))) >= 0.0:
+            yield _row(f"{name} as asked", mine, np.full(len(mine), asked))
 
 
 def _numbers(text: str | None, count: int) -> Floats:

@@ -8,6 +8,7 @@ contacts are integrated together: the velocities v (-1, 2, 2)/3 have the energy 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from functools import cache
 from typing import Any
@@ -16,7 +17,7 @@ import pandas as pd
 
 from crossbody import cases
 from crossbody.reports.judging.asked import Found, Within, unlike
-from crossbody.reports.maps.gapmap import COLUMNS, LARGEST_S, gap_map, summary
+from crossbody.reports.maps.gapmap import COLUMNS, LARGEST_S, gap_map, in_words, summary
 from crossbody.reports.runs.choice import Pick
 
 POINTS = 21
@@ -66,6 +67,14 @@ def _summaries() -> Iterator[Within]:
         for s, made, off in ((0.0, 0.01, 0.5), (1.0, 0.2, 2e-3), (2.0, 0.05, 1e-4), (3.0, 0.0, 0.0))
     ]
     told.append(told[1] | {"outcome": "diverged", "s": 1.5, "energy_created": math.nan})
-    (line,) = summary(pd.DataFrame(told, columns=list(COLUMNS))).to_dict(orient="records")
+    lines = summary(pd.DataFrame(told, columns=list(COLUMNS)))
+    (line,) = lines.to_dict(orient="records")
     for name, wanted in (("most", 0.2), ("at_s", 1.0), ("ideal_from", 2.0), ("failed", 1.0)):
         yield name, "a line of a map", float(line[name]), wanted, 1e-12
+    words = " ".join(in_words(lines))
+    for name, pattern, wanted in (
+        ("per cent", r"(\S+) % of the energy", 20.0), ("at s", r"at s = ([\d.]+)", 1.0), ("from s", r"from s = (\S+) on", 2.0),
+        ("balls", r"(\d+) balls", 3.0), ("lines", r"(\d+) of 1 follow", 1.0), ("runs", r"(\d+) runs failed", 1.0),
+    ):  # fmt: skip
+        found = re.search(pattern, words)
+        yield name, "a line of a map in words", float(found[1]) if found else math.nan, wanted, 1e-12

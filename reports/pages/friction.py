@@ -13,7 +13,7 @@ from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts
 from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Plot, Section
-from crossbody.reports.figures.styles import LINE, coded, label, plain, style
+from crossbody.reports.figures.styles import LINE, coded, label, plain, single, style
 from crossbody.reports.pages.figures import (
     NONE,
     ROUNDING,
@@ -124,7 +124,7 @@ def _drawn(trace: Trace, x: Floats, y: Floats, mode: str, **more: Any) -> dict[s
     """One line of one engine in a plane."""
     look = style(trace)
     return {
-        "type": "scatter", "mode": mode, "x": coded(x.astype(np.float32)), "y": coded(y.astype(np.float32)),
+        "type": "scatter", "mode": mode, "x": coded(single(x)), "y": coded(single(y)),
         "name": plain(label(trace)), "meta": label(trace),
         "line": {key: look[key] for key in ("color", "dash", "width")},
     } | more  # fmt: skip

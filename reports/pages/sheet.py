@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import called, coded, label, level, number, plain, style
+from crossbody.reports.figures.styles import called, coded, label, level, number, plain, single, style
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep
@@ -112,8 +112,7 @@ class Sheet:
             "line": {key: look[key] for key in ("color", "dash", "width")} | more,
             "opacity": 0.65 if label(trace) == TRUTH else 1.0,
         }  # fmt: skip
-        with np.errstate(over="ignore"):  # what is larger than any plot shows is a gap
-            self.lines.append((row, drawn_y.astype(np.float32), line))
+        self.lines.append((row, single(drawn_y), line))
 
     def band_of(self, trace: Trace, row: int, y: Floats, swings: float) -> None:
         """Draw of a comb its least to largest in every part of the horizon, below all lines, and its mean over time.
@@ -135,7 +134,7 @@ class Sheet:
             "meta": label(trace), "mode": "lines", "line": {"width": 0, "color": color}, "fill": "toself",
             "fillcolor": color, "opacity": 0.25, "hoverinfo": "skip",
         }  # fmt: skip
-        self.lines.insert(0, (row, around.astype(np.float32), band))
+        self.lines.insert(0, (row, single(around), band))
         self.combs[label(trace)] = None
 
     def _dots(
@@ -147,8 +146,7 @@ class Sheet:
         self.sparse = True
         dots = {"type": "scatter", "x": coded(_times(t[at])), "name": "", "meta": label(trace), "mode": "markers",
                 "marker": {"size": 4, "color": color}, "cliponaxis": False}  # fmt: skip
-        with np.errstate(over="ignore"):
-            self.lines.append((row, y[at].astype(np.float32), dots))
+        self.lines.append((row, single(y[at]), dots))
 
     def done(self) -> dict[str, Any]:
         """The figure."""

@@ -10,7 +10,7 @@ import pandas as pd
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, coded, level, look, number, plain
+from crossbody.reports.figures.styles import COLOURS, coded, level, look, number, plain, single
 
 GREY = "#888888"
 SIGNED = [[0.0, COLOURS[0]], [0.5, "#f4f4f4"], [1.0, COLOURS[3]]]
@@ -160,7 +160,7 @@ def _line(x: Floats, y: Floats, name: str, place: int, engine: bool = False) -> 
     drawn = ({key: look(name)[key] for key in ("color", "dash")} if engine else {"color": COLOURS[0]}) | {"width": 1.5}
     axis = number(place)
     return {
-        "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(y.astype(np.float32)),
+        "type": "scatter", "mode": "lines", "x": coded(x), "y": coded(single(y)),
         "name": plain(name), "legendgroup": plain(name), "showlegend": place == 1, "line": drawn,
         "xaxis": f"x{axis}", "yaxis": f"y{axis}",
     } | ({"meta": name} if engine else {})  # fmt: skip

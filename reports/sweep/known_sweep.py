@@ -13,6 +13,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from crossbody import cases
 from crossbody.cases import Case, Outcome, Trajectory
@@ -20,8 +21,9 @@ from crossbody.cases.trajectory import Ledger
 from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.suites.axis import Levels, Linear, Log, Whole
-from crossbody.reports.sweep.execute import Tried, row
+from crossbody.reports.sweep.execute import REFUSED, SKIPPED, Tried, row
 from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, residual
+from crossbody.reports.sweep.minimise import failures
 from crossbody.reports.sweep.spec import Spec
 
 OFF, LIMIT, EXACT = 1e-4, 1e-6, 1e-9
@@ -35,7 +37,7 @@ OPEN = 40.0
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of what, where it is another one."""
-    return unlike((_errors, _accounts, _axes, _words), "sweep", "a made-up run that ends in")
+    return unlike((_errors, _accounts, _axes, _words, _failures), "sweep", "a made-up run that ends in")
 
 
 @cache
@@ -114,6 +116,19 @@ def _words() -> Iterator[Within]:
     ):  # fmt: skip
         found = row(_spec(who), tried, error_, list(heard))["verdict"]
         yield "verdict", f"a run {what}", float(found != wanted.value), 0.0, 0.0
+
+
+def _failures() -> Iterator[Within]:
+    """Yield 1 where a row of a word and an outcome is told among failures and must not be, or is not and must, else 0."""
+    kinds = [
+        (Word.OUTSIDE, Outcome.FINISHED.value, True), (Word.INFO, Outcome.DIVERGED.value, True),
+        (Word.OUTSIDE, Outcome.STEP_LIMIT.value, True), (Word.WITHIN, Outcome.FINISHED.value, False),
+        (Word.LEDGER, Outcome.FINISHED.value, False), (Word.SKIPPED, REFUSED, False), (Word.SKIPPED, SKIPPED, False),
+    ]  # fmt: skip
+    rows = pd.DataFrame([(str(word), outcome) for word, outcome, _ in kinds], columns=["verdict", "outcome"])
+    found = set(failures(rows).index)
+    for i, (word, outcome, told) in enumerate(kinds):
+        yield "failures", f"a run that is {word} and {outcome}", float((i in found) != told), 0.0, 0.0
 
 
 def _spec(engine: str) -> Spec:

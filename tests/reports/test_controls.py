@@ -14,6 +14,7 @@ from random_scenes import random_scene, random_state, with_own_laws
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Claim, Limit, Mode, Tier
+from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.engines.equations import system_of
 from crossbody.reports import metrics
@@ -199,6 +200,20 @@ def test_rows_of_the_truth_have_no_name_of_a_metric_and_stand_on_a_page(
         study.write(out, [result], rows, {"command": "crossbody run", "time": ""})
         site.write(out)
     assert "velocity (control)" in (tmp_path / "out" / f"case-{case.label.replace(':', '.')}.html").read_text()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_control_fails_on_dry_friction_however_light_beside_what_flies(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    loss, stops = 10.0 ** draw.uniform(-2.0, 1.0), draw.uniform(0.02, 0.4)
+    inertia, mass = float(draw.uniform(0.01, 0.1)), float(draw.uniform(0.5, 3.0))
+    wheel = Body(name="wheel", mass=mass, inertia=(inertia,) * 3 + (0.0,) * 3)
+    weight = Body(name="weight", mass=mass, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    joints = (Joint(name="turn", body="wheel", type="hinge", axis=(0.0, 1.0, 0.0), friction_loss=loss),
+              Joint(name="fall", body="weight", type="slide", axis=(0.0, 0.0, 1.0)))  # fmt: skip
+    scene = Scene(bodies=(wheel, weight), joints=joints, gravity=(0.0, 0.0, -9.81))
+    case = case_of(scene, name="stops", q0=[0.1, 1.0], v0=[loss / inertia * stops, 2.0], t_end=0.5)
+    assert blind(case, truth_of(case)) == []
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-6])

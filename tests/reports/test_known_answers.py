@@ -167,13 +167,13 @@ def test_arithmetic_that_is_off_by_a_millionth_is_told(
 
 
 def test_steps_that_err_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    own = known_steps._run
+    own = known_steps.stepped
 
     def off(*given: Any) -> Trajectory:
         run = own(*given)
         return replace(run, q=run.q * (1.0 + 1e-3), steps=3 * run.steps if given[3] < 1e-7 else run.steps)
 
-    monkeypatch.setattr(known_steps, "_run", off)
+    monkeypatch.setattr(known_steps, "stepped", off)
     told = {name for name, *_ in known_steps._cubic()}
     assert told == {
         f"reference {name}{what}" for name in ("explicit", "implicit") for what in ("", " (steps)", " (work)")

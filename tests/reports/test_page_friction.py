@@ -141,3 +141,13 @@ def test_a_line_is_round_where_few_of_many_samples_turn_and_broken_at_a_jump(tra
     chords = np.linalg.norm(np.diff(drawn, axis=0), axis=1)
     assert np.nanmax(chords) < 0.3
     assert np.isnan(drawn).any(axis=1).sum() == 1
+
+
+def test_forces_beyond_single_precision_are_gaps_and_no_warning(trace: Trace) -> None:
+    lam, gap = np.array(trace.run.lam), np.array(trace.run.gap)
+    lam[-3:] *= 1e245
+    gap[-3:] = 1e200
+    far = replace(trace, run=replace(trace.run, lam=lam, gap=gap))
+    with np.errstate(over="raise"):
+        sections = [*hysteresis([trace, far]), *friction([trace, far])]
+    assert sections

@@ -32,7 +32,7 @@ NEEDLESS = {
 WARM = (
     "crossbody.reference.core.advance", "crossbody.reports.judging.known_answers",
     "crossbody.reports.judging.known_drives", "crossbody.reports.judging.known_engines",
-    "crossbody.reports.judging.known_scenes",
+    "crossbody.reports.judging.known_scenes", "crossbody.reports.judging.known_turns",
 )  # fmt: skip
 """What the first run of a version of the code asks for, and keeps."""
 

@@ -55,6 +55,19 @@ def test_a_start_is_what_was_asked_for_in_place_of_the_keyframe(variant: str) ->
     assert wrong(replace(case, v0=case.v0[::-1].copy())) == ["v of the file", "rate as asked"]
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_constants_of_the_law_are_those_that_were_asked_for(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    asked = {name: float(10.0 ** draw.uniform(-1.0, 4.0)) for name in ("a0", "a1") if draw.random() < 0.6} or {
+        "a1": 0.0
+    }
+    case, plain = cases.load(str(BOX), "two", friction=1, **asked), cases.load(str(BOX), "two", friction=1)
+    assert wrong(case) == []
+    for name in ("a0", "a1"):
+        other = replace(case, law=replace(case.law, **{name: getattr(plain.law, name)}))
+        assert wrong(other) == [f"{name} as asked"] * (name in asked)
+
+
 def changed(case: Case, times: Any = None, values: Any = None) -> Case:
     assert case.inputs is not None
     inputs = replace(
