@@ -53,6 +53,13 @@ class EngineRun:
         return sorted((row for row in self.rows if row["verdict"] in WRONG), key=farthest)
 
     @property
+    def first(self) -> Row:
+        """The number that is named of what is wrong: the farthest out; a quantity before one that there is not."""
+        measured = (row for row in self.wrong if row["metric"] in QUANTITIES and math.isfinite(share(row)))
+        worst = self.wrong[0]
+        return worst if math.isfinite(share(worst)) else min(measured, key=telling, default=worst)
+
+    @property
     def failed(self) -> Row | None:
         """The row that says why it ended early, if it did: its other numbers follow from that."""
         return next((row for row in self.wrong if row["metric"] == FINISHED), None)
@@ -149,7 +156,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     if len(ran) < len(all_ran):
         text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
     for said, of_truth in (("Off", False), ("In doubt", True)):
-        some = [_off(run, run.wrong[0]) for run in off if run.who.startswith(TRUTH) == of_truth]
+        some = [_off(run, run.first) for run in off if run.who.startswith(TRUTH) == of_truth]
         text += f" {said}: {_named(some)}." if some else ""
     if loose:
         loose.sort(key=lambda one: -share(one[1]))

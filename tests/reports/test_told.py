@@ -103,6 +103,15 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
     assert ("0.31 of the horizon" in text) == (truth["compared"] < 1.0)
 
 
+def test_a_number_that_is_off_is_named_before_one_that_there_is_not() -> None:
+    """A run without a touch has no instants of it; how far it is off says more."""
+    lost = row("fake:one", Word.OUTSIDE, "mode_times", value=math.nan)
+    off = row("fake:one", Word.OUTSIDE, "position", value=0.16)
+    for rows in ((lost, off), (off, lost)):
+        assert "Off: fake:one on ball:hard (position 0.16, " in sentence(runs_of(rows))
+    assert "Off: fake:one on ball:hard (mode_times outside)." in sentence(runs_of([lost]))
+
+
 @pytest.mark.parametrize(
     ("why", "said"),
     [
