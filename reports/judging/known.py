@@ -39,7 +39,9 @@ OF_ENGINES, OF_DRIVES = ("judging.known_engines",), ("judging.known_drives",)
 OF_CONTACTS, COMPILES = ("judging.known_contacts", "judging.known_flights"), "reference"
 """Of an engine's contacts and of bodies in flight; and the engine that compiles for them what a ball does not use."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats"),
+    "replay": (
+        "replay.known_logs", "replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats",
+    ), "log": ("replay.known_logs",),
     "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
     "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),

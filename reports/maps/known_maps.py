@@ -73,7 +73,8 @@ def _summaries() -> Iterator[Within]:
         yield name, "a line of a map", float(line[name]), wanted, 1e-12
     words = " ".join(in_words(lines))
     for name, pattern, wanted in (
-        ("per cent", r"(\S+) % of the energy", 20.0), ("at s", r"at s = ([\d.]+)", 1.0), ("from s", r"from s = (\S+) on", 2.0),
+        ("per cent", r"(\S+) % of the energy", 20.0), ("at s", r"at s = ([\d.]+)", 1.0),
+        ("from s", r"from s = (\S+) on", 2.0),
         ("balls", r"(\d+) balls", 3.0), ("lines", r"(\d+) of 1 follow", 1.0), ("runs", r"(\d+) runs failed", 1.0),
     ):  # fmt: skip
         found = re.search(pattern, words)
