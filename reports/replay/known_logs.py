@@ -1,4 +1,7 @@
-"""What checks of logs must say of clocks whose faults are known, and of a white residual."""
+"""What must be said of logs: of clocks whose faults are known, of a white residual, and of a body that turns steadily.
+
+A body with the angular velocity w in its own axes has R(t) = R(0) exp(t [w]), whatever R(0) is.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,13 @@ from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from crossbody.hw.checks.clock import ClockCheck
+from crossbody.hw.windows import turns
 from crossbody.hw.windows.whiteness import autocorrelation
 from crossbody.reports.judging.asked import Found, Within, unlike
+from crossbody.reports.judging.known_turns import about
 
 STEP, SLOW = 0.01, 3e-3
 """Between samples, s, and the part by which a clock is slow."""
@@ -18,7 +24,7 @@ STEP, SLOW = 0.01, 3e-3
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    return unlike((_looked,), "log", "a clock that ends in")
+    return unlike((_looked, _turning), "log", "a record that ends in")
 
 
 def _looked() -> Iterator[Within]:
@@ -39,3 +45,20 @@ def _looked() -> Iterator[Within]:
     yield "jitter", "a clock that is slow", clock.jitter, 0.0, 1e-6 * STEP
     draw = np.random.default_rng(9).normal(size=400)
     yield "band", "a white residual", autocorrelation(draw).band, 2.5758293035489 / 20.0, 1e-6
+
+
+def _turning() -> Iterator[Within]:
+    """Yield by how much turns are off: a little later, from sample to sample, from the first, and from another."""
+    draw = np.random.default_rng(3)
+    first, w, t = draw.uniform(-1.0, 1.0, 3), draw.uniform(-2.0, 2.0, 3), STEP * np.arange(9)
+    start = about(first, 1.0)
+    y = np.array([Rotation.from_matrix(start @ about(w, s)).as_rotvec() for s in t.tolist()])
+    later = about(turns.advanced(first, w, np.full(3, SLOW), [0]), 1.0)
+    off = draw.uniform(-0.1, 0.1, 3)
+    other = Rotation.from_matrix(about(off, 1.0) @ start).as_rotvec()
+    for what, mine, theirs in (
+        ("advanced", later, start @ about(w, SLOW)), ("way", turns.way(y, [0])[1:], np.outer(t, w)[1:]),
+        ("increments", turns.increments(y, [0]), np.tile(STEP * start @ w, (len(t) - 1, 1))),
+        ("difference", turns.difference(other[None], first[None], [0])[0], off),
+    ):  # fmt: skip
+        yield what, "a body that turns steadily", float(np.max(np.abs(mine - theirs))), 0.0, 1e-9
