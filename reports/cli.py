@@ -410,8 +410,10 @@ def log() -> None:
 @speaks
 def log_info(path: Path, columns: str | None, part: int | None, draft: bool, memory: int) -> int:
     """Show channels, rates, gaps and ranges of LOG, its faults, and a draft of a column map."""
+    from crossbody.reports.commands.shared import check_answers
     from crossbody.reports.replay.log import info
 
+    check_answers("log")
     return info(path, columns, part, draft, memory)
 
 

@@ -53,7 +53,8 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
             or name in near.untold
         )
 
-    answers = known.wrong(file=bool(case.file), scene=not plain(case), ran=ran)
+    own = "" if case.file else case.name
+    answers = known.wrong(file=bool(case.file), scene=not plain(case), ran=ran, case=own)
     for name, value, (least, most), fault in (*unseen(case, truth, outside), *unheard(case), *_unruled(case), *answers):
         if least <= value <= most:
             why = f"A control passes: {fault} is no number outside."

@@ -15,7 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
-from crossbody import engines
+from crossbody import cases, engines
 from crossbody.cases import installed
 from crossbody.cases.errors import OwnFault
 from crossbody.cases.sources import readable
@@ -37,10 +37,15 @@ OF_SCENES = ("judging.known_scenes", "judging.known_turns")
 """Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""
 OF_ENGINES, OF_DRIVES = ("judging.known_engines",), ("judging.known_drives",)
 """Of an engine that runs, beside: others are not imported for it; and of its motors, likewise with those of scenes."""
-OF_CONTACTS, COMPILES = ("judging.known_contacts", "judging.known_flights"), "reference"
+OF_CASES = ("judging.known_units",)
+"""Of one of crossbody's own cases, that runs."""
+OF_CONTACTS = ("judging.known_contacts", "judging.known_flights", "judging.known_shares")
+COMPILES = "reference"
 """Of an engine's contacts and of bodies in flight; and the engine that compiles for them what a ball does not use."""
 OF_COMMANDS = {
-    "replay": ("replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats"),
+    "replay": (
+        "replay.known_logs", "replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats",
+    ), "log": ("replay.known_logs",),
     "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
     "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),
@@ -54,19 +59,22 @@ once = False
 """Whether what was right is believed: where a command has a process of its own, so that nobody replaced functions."""
 
 
-def wrong(*, file: bool = False, scene: bool = False, ran: Iterable[str] = ()) -> Iterator[Found]:
+def wrong(*, file: bool = False, scene: bool = False, ran: Iterable[str] = (), case: str = "") -> Iterator[Found]:
     """Yield metric, part or integrator, number, least and most, and of what, for every answer that is another.
 
     Args:
         file: whether a file is run: then those of readers of files are asked too.
         scene: whether a scene is run, or what drives a case: then friction, motors and controllers are asked for too.
         ran: engines that run: each of crossbody's own is asked for its answers.
+        case: the name of what runs: of one of crossbody's own, its parameters are asked for.
     """
     yield from _once(RUNS, KINDS)
     if file:
         yield from _once(f"{RUNS}_files", OF_FILES)
     if scene:
         yield from _once(f"{RUNS}_scenes", OF_SCENES)
+    if case in cases.REGISTRY.own():
+        yield from _once(f"{RUNS}_units_{case}", OF_CASES, case)
     for name in sorted(set(ran) & set(engines.REGISTRY.own())):
         yield from _once(f"{RUNS}_{name}", OF_ENGINES, name)
         if scene or name != COMPILES:
@@ -88,20 +96,20 @@ def check(command: str) -> None:
         raise OwnFault(f"No number can be trusted: {name} of {what} is {value:.9g}, but must be {must}.{more}")
 
 
-def _once(kept: str, names: tuple[str, ...], engine: str = "") -> tuple[Found, ...]:
-    """Return what is wrong of some modules, of an engine where they ask one, once for each version of the code."""
+def _once(kept: str, names: tuple[str, ...], of: str = "") -> tuple[Found, ...]:
+    """Return what is wrong of some modules, of an engine or a case where they ask one, once a version of the code."""
     store = code_store.current() if once and readable() else None
-    name = "" if store is None else _name(kept, engine)
+    name = "" if store is None else _name(kept, of)
     if store is not None and store.has(name) and store.read(name) == RIGHT:
         return ()
-    found = tuple(_asked(names, *(engine,) if engine else ()))
+    found = tuple(_asked(names, *(of,) if of else ()))
     if store is not None and not found:
         store.write(name, RIGHT)
     return found
 
 
 def _asked(names: tuple[str, ...] = KINDS, *of: str) -> Iterator[Found]:
-    """Ask all of them, those of an engine by its name."""
+    """Ask all of them, those of an engine or a case by its name."""
     for kind in kinds(names):
         yield from kind.wrong(*of)
 
@@ -120,7 +128,7 @@ def _templates() -> str:
     return found.hexdigest()
 
 
-def _name(kept: str = RUNS, engine: str = "") -> str:
+def _name(kept: str = RUNS, of: str = "") -> str:
     """Return under which name it is kept that all were right: readable, then a digest of all that they depend on."""
     from crossbody.reference.cache import debugging, machine
 
@@ -132,6 +140,6 @@ def _name(kept: str = RUNS, engine: str = "") -> str:
         installed.version("scipy"),
         str(debugging()),
         repr(sorted(installed.digests().items())),
-        versions(engine) if engine else "",
+        versions(of) if of in engines.REGISTRY.own() else "",
     )
     return code_store.named(kept, *depends)

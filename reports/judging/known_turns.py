@@ -77,7 +77,7 @@ def _off(run: Trajectory, t: Floats) -> dict[str, float]:
     moments, axis = np.array([A, A, C]), np.array([0.0, 0.0, 1.0])
     start = matrices(np.array(TURN))
     keeps = start @ (moments * SPIN)
-    found = [_about(keeps / A, s) @ start @ _about((1.0 - C / A) * SPIN[2] * axis, s) for s in t.tolist()]
+    found = [about(keeps / A, s) @ start @ about((1.0 - C / A) * SPIN[2] * axis, s) for s in t.tolist()]
     spins = np.array([turn.T @ keeps for turn in found]) / moments
     place, rates, falls = np.array(PLACE), np.array(RATES), np.array([0.0, 0.0, -G])
     way = place + np.outer(t, rates) + 0.5 * np.outer(t**2, falls)
@@ -88,7 +88,7 @@ def _off(run: Trajectory, t: Floats) -> dict[str, float]:
     return {what: float(np.max(np.abs(mine - exact))) for what, (mine, exact) in wanted.items()}
 
 
-def _about(rate: Floats, t: float) -> Floats:
+def about(rate: Floats, t: float) -> Floats:
     """Return the rotation (3, 3) of a steady rate (3,), rad/s, after a time, by Rodrigues' formula."""
     fast = math.sqrt(float(rate @ rate))
     x, y, z = rate / fast

@@ -22,13 +22,15 @@ from crossbody import hw
 from crossbody.cases import Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.hw import Comparison, Log
-from crossbody.hw.checks.clock import ClockCheck
+from crossbody.hw.models import load as load_model
+from crossbody.hw.models.contract import Segment
 from crossbody.hw.reading.columns import parse_columns
 from crossbody.hw.reading.stream import Rows, join
 from crossbody.hw.replaying import measures
 from crossbody.hw.windows import rates
-from crossbody.hw.windows.whiteness import autocorrelation, noise_level
+from crossbody.hw.windows.whiteness import noise_level
 from crossbody.reports.judging.asked import Found, Within, unlike
+from crossbody.reports.judging.form_of_case import form_of_case
 
 EXACT, CLOSE = 1e-9, 1e-6
 """By which part sums in another order differ; and what an integrator at its tolerance, and a search, leave."""
@@ -36,6 +38,8 @@ INERTIA, MASS, REACH, DRAG, STEP, SAMPLES = 2e-3, 0.2, 0.15, 4e-3, 0.01, 240
 """Of the link: kg m^2, kg, m, N m s; of its log: s."""
 BEGINS, COUNTS, ZERO, LATE = 12.5, 4000.0, 30.0, 0.023
 """Its first time, s; counts of an encoder a turn; its angle at zero counts, degrees; and by how much it is late, s."""
+CHAINS = ("single_pendulum", "double_pendulum")
+"""Models that engines run in coordinates of their own."""
 NOISE, ALIKE = 2e-4, 0.15
 """Of angles, rad; and to which part a deviation is known by so many samples."""
 GIVEN = {"gravity": 0.0, "m1": MASS, "a1": REACH, "L1": 2.0 * REACH, "I1": INERTIA, "k1": DRAG}
@@ -109,7 +113,7 @@ WALL = 0.5
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    kinds = (_reading, _repaired, _joined, _measured, _link, _ball, _bounces, _impacts, _needed, _looked)
+    kinds = (_reading, _repaired, _joined, _measured, _link, _ball, _bounces, _impacts, _needed, _formed)
     return unlike(kinds, "log", "a log that ends in")
 
 
@@ -336,17 +340,12 @@ def _needed() -> Iterator[Within]:
     yield "instants of torques", told, float(t[0]), 6.0 * STEP, EXACT
 
 
-def _looked() -> Iterator[Within]:
-    """Yield what is found of clocks that drop samples or stand still, and how wide the band of a white residual is."""
-    even = STEP * np.arange(60, dtype=np.float64)
-    for what, times, check, count in (
-        ("a clock without fault", even, "dropped", 0), ("one sample that is lost", np.delete(even, 31), "dropped", 1),
-        ("two that are lost apart", np.delete(even, [20, 41]), "dropped", 2),
-        ("a time that stands twice", np.insert(even, 9, even[9]), "time", 1),
-    ):  # fmt: skip
-        clock = ClockCheck(STEP)
-        clock.see(np.arange(len(times)), times)
-        found = [one.count for one in clock.findings() if one.check == check]
-        yield f"{check} samples", what, float(sum(found)), float(count), 0.0
-    draw = np.random.default_rng(9).normal(size=400)
-    yield "band", "a white residual", autocorrelation(draw).band, 2.5758293035489 / 20.0, 1e-6
+def _formed() -> Iterator[Within]:
+    """Yield how far states of models that engines run in coordinates of their own are off, there and back."""
+    for name in CHAINS:
+        model = load_model(name)
+        numbers = {key: float(one.default) for key, one in model.parameters.items()}
+        y = np.linspace(0.4, 1.1, len(model.measured))
+        segment = Segment(t_end=1.0, y=y, yd=-y)
+        for row in form_of_case(model.build(numbers, segment)):
+            yield row.quantity, name, row.difference, 0.0, row.tolerance

@@ -119,7 +119,7 @@ def _words() -> Iterator[Within]:
 
 
 def _failures() -> Iterator[Within]:
-    """Yield 1 where a row of a word and an outcome is told among failures against what it is, else 0."""
+    """Yield 1 where a row of a word and an outcome is among failures and must not be, or must and is not, else 0."""
     kinds = [
         (Word.OUTSIDE, Outcome.FINISHED.value, True), (Word.INFO, Outcome.DIVERGED.value, True),
         (Word.OUTSIDE, Outcome.STEP_LIMIT.value, True), (Word.WITHIN, Outcome.FINISHED.value, False),
