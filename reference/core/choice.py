@@ -70,15 +70,20 @@ def longest_step(s: Any, m: Model, w: Work) -> float:
 
 
 @compiled
+def pole(damping: float, stiffness: float) -> float:
+    """Faster of the two poles of x'' + damping x' + stiffness x = 0, 1/s."""
+    half = 0.5 * damping
+    over = half * half - stiffness
+    return float(half + np.sqrt(over) if over > 0.0 else np.sqrt(stiffness))
+
+
+@compiled
 def _row_rate(s: Any, w: Work) -> float:
     """Fastest pole of the active rows, 1/s."""
     fastest = 0.0
     for j in range(s.na):
         i = w.idx[j]
-        half = 0.5 * w.law[i, 1]
-        stiffness = w.law[i, 0] + 3.0 * w.law[i, 2] * w.gaps[0, i] ** 2
-        over = half * half - stiffness
-        fastest = max(fastest, half + np.sqrt(over) if over > 0.0 else np.sqrt(stiffness))
+        fastest = max(fastest, pole(w.law[i, 1], w.law[i, 0] + 3.0 * w.law[i, 2] * w.gaps[0, i] ** 2))
     return float(fastest)
 
 

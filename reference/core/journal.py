@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.algebra import ULP, copy
+from crossbody.reference.core.choice import pole
 from crossbody.reference.core.layout import Buffers, Model, Work
 from crossbody.reference.kinds import Bytes
 
@@ -77,7 +76,7 @@ def chatters(s: Any, m: Model, b: Buffers) -> bool:
     """
     fastest = 0.0
     for i in range(s.nc):
-        fastest = max(fastest, np.sqrt(m.alpha[i, 0]), m.alpha[i, 1])
+        fastest = max(fastest, pole(m.alpha[i, 1], m.alpha[i, 0]))
     if (s.t - s.flurry_t) * fastest > FLURRY_PART:
         s.flurry, s.flurry_t = 0, s.t
     s.flurry += 1

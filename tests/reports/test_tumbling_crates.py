@@ -71,7 +71,7 @@ def test_a_crate_that_comes_to_rest_by_slips_that_have_no_direction(seed: int, t
     assert alarms(crate(tmp_path, drawn(seed, least=1.0), key="k", t_end=0.5)) == []
 
 
-QUICK = (4, 13, 18, 21, 28)
+QUICK = (4, 13, 18, 21)
 """They leave soon what their files cover."""
 
 
