@@ -23,9 +23,9 @@ asked, known.once = known._asked, True
 known._asked = lambda names: (print("asked"), *asked(names))[1:]
 print(len(list(known.wrong())), "wrong")
 """
-METRIC = "reports/metrics/position.py"
-SAID = "Say which coordinate"
-WRONG = ("float(np.max(off", "float(np.min(off")
+METRIC = "reports/measuring/placed.py"
+SAID = "Return the largest o"
+WRONG = ("np.argmax(parts)", "np.argmin(parts)")
 
 
 class Copy(Tree):
