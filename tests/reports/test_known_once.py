@@ -24,8 +24,8 @@ known._asked = lambda names: (print("asked"), *asked(names))[1:]
 print(len(list(known.wrong())), "wrong")
 """
 METRIC = "reports/metrics/position.py"
-SAID = "Say which coordinate"
-WRONG = ("float(np.max(off", "float(np.min(off")
+SAID = "Return the largest; "
+WRONG = ("(off, t, named, scale)", "(-off, t, named,scale)")
 
 
 class Copy(Tree):
