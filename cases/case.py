@@ -324,6 +324,7 @@ class Case:
             case on a scene, for engines, where its own coordinates are others.
         consistent: whether the start stands on the rows that are always on; False where it is off
             them on purpose, to show how the law brings it back.
+        controls: names, with units, of the inputs that a controller among the equations of `mechanism` sets.
         discrete: names of the discrete variables that `Trajectory.switches` counts by index.
         tight: tolerance at which the reference stands for the truth; larger where a stiff spring on a
             small mass makes rounding count before that (kp eps |q|/m against the tolerance of a velocity).
@@ -350,6 +351,7 @@ class Case:
     claims: tuple[Claim, ...] = ()
     metrics: Mapping[str, CaseMetric] = field(default_factory=lambda: MappingProxyType({}))
     limits: tuple[Limit, ...] = ()
+    controls: tuple[str, ...] = ()
     discrete: tuple[str, ...] = ()
     tight: float = 1e-13
     chaos: Chaos | None = None

@@ -25,8 +25,8 @@ import re
 import sys
 import tomllib
 import traceback
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache, partial
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
@@ -219,7 +219,8 @@ def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
     sys.modules[spec.name] = loaded  # dataclasses look their module up there
     _OWN[str(path.absolute())] = f"{kind.replace('plugin', 'plug-in')} file {path}"
     try:
-        spec.loader.exec_module(loaded)
+        with _unwritten():
+            spec.loader.exec_module(loaded)
     except (CrossbodyError, KeyboardInterrupt):
         del sys.modules[spec.name]
         raise
@@ -227,6 +228,16 @@ def from_file(kind: str, path: Path, known: Iterable[str] = ()) -> ModuleType:
         del sys.modules[spec.name]
         raise SceneError(_failed(path, error)) from error
     return loaded
+
+
+@contextmanager
+def _unwritten() -> Iterator[None]:
+    """Import without `__pycache__` beside the files that are imported: their folder is the user's."""
+    before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    try:
+        yield
+    finally:
+        sys.dont_write_bytecode = before
 
 
 def _failed(path: Path, error: BaseException) -> str:

@@ -513,7 +513,8 @@ class System:
         if self.velocity is None:
             return v
         qd = np.zeros(self.nq)
-        self.velocity(t, q, v, np.array(self.p) if p is None else p, qd)
+        q, v, p = (np.require(x, np.float64, ("C", "W")) for x in (q, v, self.p if p is None else p))
+        self.velocity(t, q, v, p, qd)  # kernels take no others
         return qd
 
     def displacement(self, q: Floats, d: Floats, p: Floats | None = None) -> Floats:

@@ -181,6 +181,9 @@ def stability(**asked: Any) -> int:
 @click.option("--runs", type=options.COUNT, metavar="N", help="Number of runs of the first engine, over all suites.")
 @click.option("--seed", type=options.Whole(0), default=0, show_default=True, metavar="N", help="Seed of all draws.")
 @click.option("--jobs", type=options.Whole(0, 1024), default=0, metavar="J", help="Processes; 0: one per processor.")
+@click.option(
+    "--time-limit", "limit", type=options.ABOVE_0, metavar="S", help="Time of one run, s; else the suite's own."
+)
 @click.option("--scheduler", metavar="ADDRESS", help="Run on a dask cluster instead, for example tcp://host:8786.")
 @click.option(
     "--tls-ca", default="", metavar="FILE", help="Certificates (PEM) of the authorities that may sign the scheduler's."

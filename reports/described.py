@@ -27,7 +27,7 @@ def everything() -> Named:
 
 
 def case(name: str) -> Named:
-    """Return variants, parameters, rows and own metrics of a case."""
+    """Return variants, parameters, rows and own metrics of a case; of a file also the names that options take."""
     from crossbody import cases
     from crossbody.cases import loading
 
@@ -40,9 +40,29 @@ def case(name: str) -> Named:
     rows = {row: "" for one in found.values() for row in one.contacts}
     told = {
         "Variants": {variant: f"{one.title}{_changes(one, source.PARAMETERS)}" for variant, one in found.items()},
-        "Parameters": parameters, "Rows": rows, "Metrics of its own": own,
+        "Parameters": parameters, "Rows": rows, **_of_scene(next(iter(found.values()))), "Metrics of its own": own,
     }  # fmt: skip
     return {title: named for title, named in told.items() if named}
+
+
+def _of_scene(case: Case) -> Named:
+    """Return rows that friction adds, and the names of what starts, is pushed and is driven in a file."""
+    if case.scene is None or not case.file:
+        return {}
+    from crossbody.cases.files.case import rubbing
+
+    rubs = rubbing(case)
+    return {
+        "Rows if its motion comes to a contact with friction": dict.fromkeys(
+            () if rubs is None else [row for row in rubs.contacts if row not in case.contacts], ""
+        ),
+        "Coordinates (--start)": {one.name: one.unit for one in case.coordinates if one.unit != "1"},
+        "Velocities (--rate)": {one.name: f"{one.unit}/s" for one in case.velocities},
+        "Bodies (--push)": {body.name: f"{body.mass:g} kg" for body in case.scene.bodies},
+        "Actuators (columns of --ctrl)": {
+            one.name: "[{:g}, {:g}]".format(*one.control_range) for one in case.scene.actuators
+        },
+    }
 
 
 def _changes(case: Case, known: Mapping[str, Parameter]) -> str:

@@ -27,6 +27,7 @@ WHERE_MET = -1  # of the parameter friction: contacts that slide have rows if th
 PARAMETERS = {
     "t_end": Parameter(default=1.0, unit="s", doc="horizon", low=0.0, open_low=True),
     "a0": Parameter(default=OF_THE_FILE, unit="1/s^2", doc="stiffness of every row; -1: the file's", low=OF_THE_FILE),
+    "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
     "without": Parameter(
         default="", doc="left out of every engine: friction, contacts, medium, loop:NAME, ..., separated by commas"
     ),
@@ -55,7 +56,6 @@ PARAMETERS = {
     "assemble": Parameter(
         default=False, doc="start at the nearest state to the keyframe that closes the loops", low=0, high=1
     ),
-    "a1": Parameter(default=OF_THE_FILE, unit="1/s", doc="damping of every row; -1: the file's", low=OF_THE_FILE),
 }
 ENTRIES = {
     "free": ((*"xyz", "qw", "qx", "qy", "qz"), ("m",) * 3 + ("1",) * 4),
@@ -162,7 +162,14 @@ def rubbing(case: Case) -> Case | None:
 
 
 def overruled(scene: Scene, a0: float, a1: float) -> Scene:
-    """Return the scene with these constants for all of its rows; below 0 they stay."""
+    """Return the scene with these constants for all of its rows; those of the file stay at `OF_THE_FILE`.
+
+    Raises:
+        InvalidValue: for any other number below 0.
+    """
+    for name, value in (("a0", a0), ("a1", a1)):
+        if value < 0.0 and value != OF_THE_FILE:
+            raise InvalidValue(f"{name} is {value:g}; valid: at least 0, or {OF_THE_FILE:g} for the file's own.")
     if a0 < 0.0 and a1 < 0.0:
         return scene
 
@@ -302,7 +309,8 @@ def held(scene: Scene, ctrl: Any = None) -> Inputs | None:
 AS_IT_STANDS = (
     Limit(
         metric="*", engine="mujoco", profile="as_is", covers_none=True,
-        known="the file's own step, integrator and soft rows: the parts of its error show the effect of each",
+        known="MuJoCo's step, integrator and soft rows, those of the file where it has some: the parts of its error "
+        "show the effect of each",
     ),
     Limit(
         metric="event_gap", value=1.0, engine="mujoco", profile="as_is", covers_none=True,

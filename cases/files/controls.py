@@ -42,10 +42,19 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
         raise InvalidValue(f"Controls {path}: {told}; valid: {valid}.") from None
     if values.shape != (len(times), len(names)):
         raise InvalidValue(f"Controls {path} have the shape {values.shape}; valid: ({len(times)}, {len(names)}).")
-    if not (np.isfinite(times).all() and (np.diff(times) > 0).all() and len(times) and times[0] >= 0.0):
-        raise InvalidValue(f"Controls {path}: t must be finite, at least 0 and increasing.")
+    if not len(times):
+        raise InvalidValue(f"Controls {path} have no rows; valid: one or more.")
+    fine = np.isfinite(times) & (times >= 0.0) & np.append(True, np.diff(times) > 0.0)
+    if not fine.all():
+        i = int(np.argmin(fine))
+        raise InvalidValue(
+            f"Controls {path}: t must be finite, at least 0 and increasing; row {i + 1} has {times[i]:g}."
+        )
     if not np.isfinite(values).all():
-        raise InvalidValue(f"Controls {path}: every value must be finite.")
+        i, j = np.argwhere(~np.isfinite(values))[0]
+        raise InvalidValue(
+            f"Controls {path}: every value must be finite; row {i + 1} has {values[i, j]:g} for {names[j]!r}."
+        )
     return Inputs(names=tuple(names), times=times, values=values)
 
 
@@ -64,7 +73,19 @@ def _from_table(path: Path, names: list[str]) -> tuple[Floats, Floats]:
     else:
         table = pd.read_csv(path)
         _check_columns(list(map(str, table.columns)), names)
-    return table["t"].to_numpy(dtype=float), table[names].to_numpy(dtype=float)
+    columns = [_numbers(table[name]) for name in ("t", *names)]
+    return columns[0], np.stack(columns[1:], axis=1) if names else np.zeros((len(table), 0))
+
+
+def _numbers(column: Any) -> Floats:
+    """Return a column of a table; what is no number is told with its row."""
+    import pandas as pd
+
+    found = pd.to_numeric(column, errors="coerce")
+    wrong = np.flatnonzero(found.isna() & column.notna())
+    if len(wrong):
+        raise ValueError(f"row {wrong[0] + 1} has {column.iloc[wrong[0]]!r} for {column.name!r}, which is no number")
+    return np.asarray(found, dtype=float)
 
 
 def _parquet(path: Path, names: list[str]) -> Any:

@@ -85,6 +85,6 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     q0 = pose.pose(p, np.array([p["x"], p["y"], p["z"]]))
     return delta.scene(
         "delta_tracking", variant, _TITLES[variant], PARAMETERS, parameters, q0, np.zeros(9),
-        claims=claims,
+        claims=claims, controls=delta.NAMES,
         limits=(*tracking(grown), *(on_the_circle(claim.expected, settled) for claim in claims)),
     )  # fmt: skip

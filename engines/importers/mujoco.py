@@ -52,6 +52,17 @@ def softness(lib: Any, m: Any, d: Any) -> dict[str, list[float]]:
     }
 
 
+def bounds(lib: Any, m: Any) -> dict[str, list[float]]:
+    """Return of each bounded joint and tendon, by its name, lowest and highest value, and margin."""
+    on = not m.opt.disableflags & int(lib.mjtDisableBit.mjDSBL_LIMIT)
+    kinds = ((m.njnt, m.joint, "joint", m.jnt_limited, m.jnt_range, m.jnt_margin),
+             (m.ntendon, m.tendon, "tendon", m.tendon_limited, m.tendon_range, m.tendon_margin))  # fmt: skip
+    return {
+        part(i).name or f"{word}{i}": [*map(float, range_[i]), float(margin[i])]
+        for count, part, word, limited, range_, margin in kinds for i in range(count) if limited[i] and on
+    }  # fmt: skip
+
+
 class _Robot:
     free = ball = "mujoco"
 

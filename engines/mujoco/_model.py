@@ -25,7 +25,7 @@ from crossbody.engines._gates import ALL_AT_ONCE
 from crossbody.engines._real_time import depths, resolving_step
 from crossbody.engines._real_time import followed as real_time
 from crossbody.engines._scene import Forces
-from crossbody.engines.importers.mujoco import all_rows, softness
+from crossbody.engines.importers.mujoco import all_rows, bounds, softness
 from crossbody.engines.mujoco._build import compiled, spec_of, without_regularisation
 from crossbody.engines.mujoco._file import held, rebuilt
 from crossbody.engines.mujoco._gated import GatedRows
@@ -223,7 +223,11 @@ def build(
         model = obvious(scene, colliding=case.gates is not None)
     else:
         model = matched(scene)
-    law = {"law": softness(mujoco, *all_rows(mujoco, model))} if profile == "as_is" else {}  # as it was read
+    read = (
+        {"law": softness(mujoco, *all_rows(mujoco, model)), "bounds": bounds(mujoco, model)}
+        if profile == "as_is"
+        else {}
+    )
     _set_cone(model.opt, cone, impratio, noslip)
     if timeconst > 0.0:
         model.geom_solref[:, 0] = model.pair_solref[:, 0] = timeconst
@@ -249,7 +253,7 @@ def build(
         prepared.arm, prepared.margins, prepared.outlives = switched.arm, switched.margins, True
         prepared.entered = switched.entered
     own = {"set": _set(model, cone, impratio, noslip, timeconst)}
-    prepared.audit = _audit(case, profile, scene, model, rows) | law | own
+    prepared.audit = _audit(case, profile, scene, model, rows) | read | own
     return prepared
 
 

@@ -61,6 +61,7 @@ from crossbody.reference.kernels import GIVEN, START
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kinds import Index
 
+AT_STOP = 4.0  # units of rounding beside a stop in which no step fits: what comes so near has come to it
 STILL = 4096.0  # units of rounding by which time does not go on: before a jam contacts switch ever sooner
 SHORTER = 0.1  # the least part of a step that is taken anew, wherever in it something fires
 
@@ -258,11 +259,13 @@ def _try(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 @compiled
 def _step(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """One step, cut short where a machine must switch."""
+    if s.stop - s.t <= AT_STOP * ULP * abs(s.stop):
+        return _stop_at_once(K, s, m, w, b)
     code = _try(K, s, m, w, b)
     if code != 0:
         return 0 if code == TOO_LONG else int(code)
     fired = s.theta <= 1.0
-    at_stop = s.t_old + s.hs >= s.stop - 4.0 * ULP * abs(s.stop)
+    at_stop = s.t_old + s.hs >= s.stop - AT_STOP * ULP * abs(s.stop)
     t = s.t_old + s.theta * s.hs if fired else (s.stop if at_stop else s.t_old + s.hs)
     before_rows = s.rhs
     record.within_step(K, s, m, w, b.mode, b.samples, t, b.out, b.modes)
@@ -299,10 +302,30 @@ def _arrive(K: Any, s: Any, m: Model, w: Work, b: Buffers, t: float, at_stop: bo
     if s.idle > 0 or (s.parting and not s.frictional):
         code = _share_anew(K, s, m, w, b)
     if at_stop and s.stop < s.t_end:
-        _take_inputs(K, s, m, w, b)
-        code = _resume(K, s, m, w, b)
-        if code == 0:
-            record.here(K, s, m, w, b.mode, b.out, b.modes, False)
+        return _go_on(K, s, m, w, b)
+    return int(code)
+
+
+@compiled
+def _stop_at_once(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Go to the next stop where contacts have switched so near before it that no step fits between."""
+    s.t = s.stop
+    while not s.natural and s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:
+        record.write_row(s, w, b.mode, b.samples[s.next_sample], w.y, w.lam0, w.z, b.out, b.modes)
+        s.next_sample += 1
+    if s.stop < s.t_end:
+        return _go_on(K, s, m, w, b)
+    record.here(K, s, m, w, b.mode, b.out, b.modes, False)
+    return 0
+
+
+@compiled
+def _go_on(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Take the inputs that hold from the present instant on, at which a step has ended."""
+    _take_inputs(K, s, m, w, b)
+    code = _resume(K, s, m, w, b)
+    if code == 0:
+        record.here(K, s, m, w, b.mode, b.out, b.modes, False)
     return int(code)
 
 

@@ -21,7 +21,9 @@ from crossbody.reference.core.layout import EXACT, EXPLICIT, NEVER, NODES, Model
 from crossbody.reference.kinds import Bytes
 
 STRIDE = 0.12  # part of the step from a place of a search to the next
-CLOSER = 5  # parabolas that close in on a peak
+CLOSER = 8  # parabolas that close in on a peak
+PROMISED = 0.01  # part of the tolerance that a parabola promises at the end: what is not even in it promises too little
+NEAREST = 1e-5  # part of the step from its end up to which a peak is searched for
 NUDGE = 1e-5  # part of the step along which a slope is taken
 RISING = 0.25  # slope at the end, of what the step gains: a multiplier that rises faster does not turn there
 NOISE = 2.0  # times by which the stages may be farther off than the last of them is off the step's end
@@ -100,6 +102,24 @@ def _may_turn(s: Any, w: Work, i: int) -> bool:
 
 
 @compiled
+def _has_just_turned(s: Any, w: Work, i: int) -> bool:
+    """Whether the multiplier of row i, the largest of its contact at the step's start, may have a peak just behind it.
+
+    The first stages that tell anything may stand below a peak that they are behind: the parabola through two of them
+    and the start says how fast it falls there, and how far a turn before them could take it.
+    """
+    start = w.lams[0, i]
+    if s.method == EXACT or start < w.highest[i]:
+        return False
+    early, middle = (3, 6) if s.method == EXPLICIT else (1, 2)
+    reach, far = stage_place(s, early), stage_place(s, middle)
+    steep, steeper = (w.lam_at[early, i] - start) / reach, (w.lam_at[middle, i] - start) / far
+    bend = (steeper - steep) / (far - reach)
+    falls = steep - bend * reach <= -RISING * abs(steeper) * far
+    return bool(not falls and MARGIN * abs(bend) * reach * reach > s.rtol * abs(start))
+
+
+@compiled
 def _suspect(K: Any, s: Any, m: Model, w: Work, end: float) -> bool:
     """Leave in w.peak where to look for the peak of every active row, NEVER where there can be none; whether any."""
     found, starting, turning = False, False, False
@@ -109,6 +129,8 @@ def _suspect(K: Any, s: Any, m: Model, w: Work, end: float) -> bool:
             place = _inside(s, w, i, end)
             if place == NEVER and end == 1.0 and _may_turn(s, w, i):
                 place = 1.0
+            elif place == NEVER and _has_just_turned(s, w, i):
+                place = 0.0
             w.peak[i] = place
             found = found or 0.0 < place < 1.0
             starting, turning = starting or place == 0.0, turning or place == 1.0
@@ -170,7 +192,7 @@ def _peak(K: Any, s: Any, m: Model, w: Work, i: int, end: float) -> float:
             f1 = _multiplier(K, s, m, w, i, x1) if at_end else f2
             x2 = min(x1 + STRIDE, end)
             f2 = f2 if at_end else _multiplier(K, s, m, w, i, x2)
-        if at_end:
+        if at_end and min(x1, end - x1) < NEAREST:
             break
     if not (f1 > f0 and f1 > f2):
         return NEVER
@@ -188,7 +210,7 @@ def _close_in(
 ) -> tuple[float, float]:  # fmt: skip
     """Place and value of the largest multiplier between x0 and x2, by parabolas through three values.
 
-    It ends where the parabola promises less than the tolerance can tell.
+    It ends where the parabola promises far less than the tolerance can tell.
     """
     for _ in range(CLOSER):
         a, b = (x1 - x0) * (f1 - f2), (x1 - x2) * (f1 - f0)
@@ -196,7 +218,7 @@ def _close_in(
             break
         x = x1 - 0.5 * ((x1 - x0) * a - (x1 - x2) * b) / (a - b)
         gain = (a - b) / ((x1 - x0) * (x2 - x1) * (x2 - x0)) * (x - x1) ** 2
-        if not x0 < x < x2 or gain <= s.rtol * abs(f1):
+        if not x0 < x < x2 or gain <= PROMISED * s.rtol * abs(f1):
             break
         f = _multiplier(K, s, m, w, i, x)
         if f > f1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,21 +12,25 @@ from crossbody.reports.analysis.bode import OUTPUTS, UNITS
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES, LEVEL, Panels
 
+MARKS = ("x", "circle-open", "square-open", "diamond-open", "triangle-up-open")
 USUAL = 0.98  # part of a map that its colours tell apart: beside a singular pose growth has no bound
 RESPONDING = 1e-12  # part of the largest magnitude below which a response is none
 
 
 def pole_figure(rows: pd.DataFrame) -> Figure:
-    """Poles of every place in the complex plane."""
+    """Poles of every place in the complex plane; those of several at one point are marks around each other."""
     plane = _plane("Poles of the linear models")
     for i, (place, group) in enumerate(rows.groupby("place", sort=False)):
-        marker = {"symbol": "x", "size": 9, "color": COLOURS[i % len(COLOURS)]}
+        marker = {"symbol": MARKS[i % len(MARKS)], "size": 8 + 3 * i, "color": COLOURS[i % len(COLOURS)]}
         plane.add(x=group["real"], y=group["imag"], name=str(place), mode="markers", marker=marker)
     return plane.figure(shapes=AXIS)
 
 
-def locus_figure(rows: pd.DataFrame) -> Figure:
-    """Branches of every place over a parameter; a cross at its first value, a circle at its last."""
+def locus_figure(rows: pd.DataFrame, limits: pd.DataFrame | None = None) -> Figure:
+    """Branches of every place over a parameter; a cross at its first value, a circle at its last.
+
+    A diamond is where one crosses into the other half, of limits as of `loci.limits`.
+    """
     plane = _plane(f"Root locus over {rows['parameter'].iloc[0]}")
     for i, (place, group) in enumerate(rows.groupby("place", sort=False)):
         for j, (_, line) in enumerate(group.groupby("branch", sort=True)):
@@ -36,7 +41,17 @@ def locus_figure(rows: pd.DataFrame) -> Figure:
                 marker={"size": [8 if s else 0.1 for s in symbols], "symbol": [s or "circle" for s in symbols]},
                 customdata=line["value"], hovertemplate="%{x:.4g} %{y:+.4g}i at %{customdata:.4g}",
             )  # fmt: skip
+    for i, limit in enumerate(() if limits is None else limits.to_dict(orient="records")):
+        plane.add(
+            x=[0.0, 0.0], y=[limit["frequency"], -limit["frequency"]], mode="markers",
+            name=f"{limit['place']}: unstable {limit['unstable']} {limit['value']:.6g}",
+            marker={"symbol": "diamond-open", "size": 12 + 4 * i, "color": COLOURS[_place(rows, limit) % len(COLOURS)]},
+        )  # fmt: skip
     return plane.figure(shapes=AXIS)
+
+
+def _place(rows: pd.DataFrame, limit: Mapping[Any, Any]) -> int:
+    return list(rows["place"].unique()).index(limit["place"])
 
 
 AXIS = ({

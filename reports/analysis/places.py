@@ -23,8 +23,13 @@ from crossbody.engines.reference import ReferenceRun
 from crossbody.reference import System, delta
 from crossbody.reference.delta import scene
 from crossbody.reference.delta.loop import closed_loop
+from crossbody.reference.kinds import Array
 from crossbody.reference.linear import LinearModel, Trim, linearise, trim
 
+TRIED = 8
+"""Samples of a run beside which equilibria are looked for in each set of rows."""
+DEEP, SAME, ALIKE = 1e-9, 1e-9, 1e-6
+"""Depth that rounding leaves of a bound; change of a position, and of poles over the largest, that is none."""
 ON = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
 
 
@@ -211,21 +216,30 @@ def _visited(case: Case, at: Mapping[str, float]) -> list[Place]:
     prepared = engines.load("reference").prepare(case, "compiled")
     run, system = prepared.run(), system_of(case, prepared.system if isinstance(prepared, ReferenceRun) else None)
     follows, drift = np.asarray(system.follows), np.asarray(system.drift)
-    sets: dict[tuple[tuple[int, bool], ...], tuple[float, int]] = {}
+    sets: dict[tuple[tuple[int, bool], ...], list[tuple[float, int]]] = {}
     for k, (v, modes) in enumerate(zip(run.v, run.mode, strict=True)):
         slips = np.abs(system.gap(run.q[k], v)[1] - drift) if system.frictional else v
         on = [i for i, mode in enumerate(modes.tolist()) if mode in ON]
         rows = tuple((i, modes[i] == Mode.SLIP) for i in on if follows[i] in (-1, i))
         slowest = [slips[j : j + system.tangents[i]].max() for i, slides in rows if slides for j in [system.tangent[i]]]
-        least = -min(slowest) if slowest else np.abs(v).max()
-        sets[rows] = min(sets.get(rows, (np.inf, k)), (float(least), k))
-    found = [_seen(case, system, run, k, dict(rows)) for rows, (_, k) in sets.items()]
+        sets.setdefault(rows, []).append((float(-min(slowest) if slowest else np.abs(v).max()), k))
+    found = [place for rows, seen in sets.items() for place in _seen(case, system, run, seen, dict(rows))]
     return sorted(found, key=lambda place: place.model is None)
 
 
-def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int, bool]) -> Place:
-    """Sample k of a run, with these rows on and some sliding: the equilibrium beside it, if any."""
-    sliding, t = [i for i, slides in rows.items() if slides], float(run.t[k])
+def _seen(
+    case: Case, system: System, run: Trajectory, seen: Sequence[tuple[float, int]], rows: Mapping[int, bool]
+) -> list[Place]:
+    """The equilibria beside samples of a run with these rows on; where some slide, or muscles act, the slowest itself.
+
+    Args:
+        case: what was run.
+        system: its equations.
+        run: of it.
+        seen: how fast it is in each sample with these rows, and which one that is.
+        rows: those that are on, and whether they slide.
+    """
+    sliding, (_, k) = [i for i, slides in rows.items() if slides], min(seen)
     one_way = [i for i in rows if case.law.unilateral[i]]
     sticks = [case.contacts[i] for i in one_way if system.tangents[i] and not rows[i]]
     names = {
@@ -233,18 +247,70 @@ def _seen(case: Case, system: System, run: Trajectory, k: int, rows: Mapping[int
         "held by": sticks, "sliding on": [case.contacts[i] for i in sliding],
     }  # fmt: skip
     name = ", ".join(f"{how} {', '.join(which)}" for how, which in names.items() if which) or "touching nothing"
-    u, model, why = case.inputs.at(t) if case.inputs is not None else None, None, ""
+    if sliding or system.activations is not None:
+        return [_passed(case, name, system, run, k, rows)]
+    spread = np.linspace(0, len(seen) - 1, min(len(seen), TRIED)).astype(int)
+    tried = dict.fromkeys([k, *(seen[i][1] for i in spread)])
+    held, places, why = not one_way, list[Place](), ""
+    for i in tried:
+        try:
+            places.append(_place(case, name, list(rows), held=held, q=run.q[i], t=float(run.t[i]), system=system))
+        except SceneError as error:
+            why = why or str(error)
+    if not places:
+        return [_passed(case, name, system, run, k, rows, why)]
+    found = _distinct([_nearest(place, list(rows), held) for place in places if not _beyond(place)]) or places[:1]
+    return [replace(one, name=f"{name} ({i})") for i, one in enumerate(found, 1)] if len(found) > 1 else found
+
+
+def _beyond(place: Place) -> bool:
+    """Whether a row that is off is behind its bound there, so that it would be on."""
+    system, q = place.system, place.trim.q
+    off = (np.asarray(system.unilateral) != 0) & (np.asarray(system.follows) < 0)
+    off[place.trim.active] = False
+    return bool((system.gap(q, np.zeros(system.n))[0][off] < -DEEP * max(1.0, np.abs(q).max(initial=0.0))).any())
+
+
+def _nearest(place: Place, rows: Sequence[int], held: bool) -> Place:
+    """The same equilibrium with angles less than half a turn from the start, where whole turns lead to it."""
+    turns, q, q0 = [i for i, c in enumerate(place.case.coordinates) if c.unit == "rad"], place.trim.q, place.case.q0
+    wrapped = q.copy()
+    wrapped[turns] -= 2.0 * np.pi * np.round((q - q0)[turns] / (2.0 * np.pi))
+    if place.model is None or np.array_equal(wrapped, q):
+        return place
+    found = _place(place.case, place.name, rows, held=held, q=wrapped, t=place.t, system=place.system)
+    stays = found.model is not None and np.abs(found.trim.q - wrapped).max() <= SAME * max(1.0, np.abs(wrapped).max())
+    return found if stays and not _beyond(found) else place
+
+
+def _distinct(places: Sequence[Place]) -> list[Place]:
+    """Places with a model but for those with the poles of one before: where a body that floats stands is no other."""
+    found: list[tuple[Place, Array]] = []
+    for place in places:
+        if place.model is None:
+            continue
+        poles = np.sort_complex(np.round(place.model.poles(), 12))
+        size = np.abs(poles).max(initial=0.0)
+        if all(len(poles) != len(p) or np.abs(poles - p).max(initial=0.0) > ALIKE * size for _, p in found):
+            found.append((place, poles))
+    return [place for place, _ in found]
+
+
+def _passed(
+    case: Case, name: str, system: System, run: Trajectory, k: int, rows: Mapping[int, bool], why: str = ""
+) -> Place:  # fmt: skip
+    """Sample k of a run, with these rows on and some sliding, or with muscles: the tangent of the motion there."""
+    t, sliding = float(run.t[k]), [i for i, slides in rows.items() if slides]
+    u, model = case.inputs.at(t) if case.inputs is not None else None, None
     active = np.array(
         [i for i, f in enumerate(np.asarray(system.follows).tolist()) if i in rows or f in rows], dtype=np.int64
     )
     try:
-        if not sliding and system.activations is None:
-            return _place(case, name, list(rows), held=not one_way, q=run.q[k], t=t, system=system)
-        model = linearise(
-            system, run.q[k], run.v[k], u, list(rows), sliding=sliding, t=t,
-            activations=_activations(case, system, t),
-            names=[coordinate.name for coordinate in case.velocities],
-        )  # fmt: skip
+        if not why:
+            model = linearise(
+                system, run.q[k], run.v[k], u, list(rows), sliding=sliding, t=t,
+                activations=_activations(case, system, t), names=[c.name for c in case.velocities],
+            )  # fmt: skip
     except SceneError as error:
         why = str(error)
     passed = Trim(

@@ -75,6 +75,22 @@ def sentence(label: str, rows: pd.DataFrame, places: int) -> str:
     return f"{_verdict(label, told)} {_modes(told)}{_steps(told)}{more}"
 
 
+def over(parameter: str, ends: tuple[float, float], limits: pd.DataFrame) -> str:
+    """Say where stability is gained or lost over a parameter, in the order of its values.
+
+    Args:
+        parameter: its name.
+        ends: between which values it was varied.
+        limits: as of `loci.limits`.
+    """
+    if not len(limits):
+        return f"Nothing gains or loses its stability over {parameter} = {ends[0]:g} .. {ends[1]:g}."
+    sides: dict[tuple[str, str], list[str]] = {}
+    for row in limits.to_dict(orient="records"):
+        sides.setdefault((f"{row['value']:.6g}", row["unstable"]), []).append(row["place"])
+    return " ".join(f"Unstable {side} {parameter} = {value}: {', '.join(who)}." for (value, side), who in sides.items())
+
+
 def _verdict(label: str, rows: Sequence[Told]) -> str:
     worst = max(rows, key=lambda row: row["growth"])
     ends = {

@@ -89,17 +89,20 @@ def analyse(
             tables[key] = more
     if bode and len(rows := work.responses(found, OMEGA)):
         tables["responses"] = rows
+    says = told.sentence(case.label, tables["summary"], len(found))
     if locus:
         parameter, values = parse_range(locus)
         family = Family(name, variant, overrides, place, parameter)
         tables["locus"], tables["limits"] = root_locus(family, values), limits(family, values)
+        says = f"{told.over(parameter, (values[0], values[-1]), tables['limits'])} {says}"
+    tables = {"says": pd.DataFrame({"case": [case.label], "says": [says]}), **tables}
     if mapped:
         tables["map"] = work.workspace(case)
     if out is not None:
         output.check(out, "analyse")
         publish(out, "analyse", {f"{PREFIX}{key}": rows for key, rows in tables.items()}, provenance(command))
     if not voice.told_as_json(tables) and not voice.quiet():
-        click.echo(layout.told(told.sentence(case.label, tables["summary"], len(found))) + "\n")
+        click.echo(layout.told(says) + "\n")
         _show(case.label, tables)
         if out is not None:
             where(out)

@@ -22,6 +22,7 @@ from crossbody.reports.runs.choice import DEFAULT_ENGINES
 MANY = 4  # cases that are named of those that an engine could not run
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
+RELATIVE = "Errors of position and their parts are relative: to the largest coordinate of a kind in the motion."
 COUNTED: dict[str, Callable[[Row], bool]] = {
     "within": lambda row: row["verdict"] == Word.WITHIN,
     "known": lambda row: row["verdict"] == Word.EXPECTED,
@@ -57,7 +58,14 @@ def show(rows: Sequence[Row], times: Times) -> None:
     for i, text in enumerate(texts):
         if i >= len(above) or not voice.quiet():
             click.echo(text + "\n" * (i < len(above) - 1))
+        if i == 1 and not voice.quiet() and _relative(runs):
+            click.echo(layout.told(RELATIVE) + "\n")
     printed.check(texts, rows, times, layout.columns())
+
+
+def _relative(runs: Sequence[EngineRun]) -> bool:
+    """Return whether the table has errors of position."""
+    return any(row["metric"] in SHOWN.values() and row["value"] == row["value"] for run in runs for row in run.rows)
 
 
 def show_unselected(wanted: Sequence[str]) -> None:

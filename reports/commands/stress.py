@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,7 @@ class Ask:
     tls: pools.Tls = field(default_factory=pools.Tls)
     resume: bool = False
     pairs: Sequence[str] = ()
+    limit: float | None = None
 
 
 def stress(ask: Ask, out: Path, command: str) -> int:
@@ -80,7 +81,8 @@ def plan(ask: Ask) -> list[Spec]:
         draw.check(name, suite)
     given = choice.picks(ask.wanted) if ask.wanted else None
     picks = {name: given or choice.picks(suite.engines) for name, suite in chosen}
-    return draw.specs(chosen, picks, ask.runs, ask.seed, share=given is None)
+    specs = draw.specs(chosen, picks, ask.runs, ask.seed, share=given is None)
+    return specs if ask.limit is None else [replace(spec, time_limit=ask.limit) for spec in specs]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,6 +16,7 @@ import numpy as np
 from crossbody.cases import Case
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import normalised
+from crossbody.cases.scene import UNBOUNDED, Joint, Tendon
 from crossbody.cases.scene_contacts import softness
 
 TOLERANCE = 1e-10
@@ -178,7 +179,7 @@ def audit(
     """
     hidden = {**hidden, **mine.get("hidden", {})}
     at = at or states(case, theirs)
-    numbers = (*_numbers(mine, theirs, hidden), *_laws(mine, case))
+    numbers = (*_numbers(mine, theirs, hidden), *_laws(mine, case), *_bounds(mine, case))
     functions = (_function(key, mine, theirs, at, hidden) for key in FUNCTIONS if key in theirs)
     return (*numbers, *functions)
 
@@ -215,3 +216,30 @@ def _laws(mine: Mapping[str, Any], case: Case) -> Iterator[AuditRow]:
     ]
     said = f"a0 and a1 of {len(off) // 2} rows"
     yield AuditRow(quantity="law", mine=said, theirs=said, difference=max(off, default=0.0), tolerance=TOLERANCE)
+
+
+def _bounds(mine: Mapping[str, Any], case: Case) -> Iterator[AuditRow]:
+    """Yield how far ends and margins are off of bounds that an engine has that read the file, reached or not."""
+    if case.scene is None or "bounds" not in mine:
+        return
+    every: tuple[Joint | Tendon, ...] = (*case.scene.joints, *case.scene.tendons)
+    parts = [part for part in every if not set(part.range) <= set(UNBOUNDED)]
+    wanted = {part.name: [part.range[0], part.range[1], part.margin] for part in parts}
+    balls = {joint.name for joint in case.scene.joints if joint.type == "ball"}
+    own = {name: [-np.inf if name in balls else low, *more] for name, (low, *more) in mine["bounds"].items()}
+    off = [_apart_of_bounds(own.get(name), wanted.get(name)) for name in {*own, *wanted}]
+    if not off:
+        return
+    said = (f"ends and margins of {len(one)} bounds" for one in (own, wanted))
+    yield AuditRow(
+        quantity="bounds", mine=next(said), theirs=next(said), difference=max(off, default=0.0), tolerance=TOLERANCE
+    )
+
+
+def _apart_of_bounds(mine: Sequence[float] | None, theirs: Sequence[float] | None) -> float:
+    """Return by how much ends and margin are off, of the largest; infinite where one has no such bound."""
+    if mine is None or theirs is None:
+        return np.inf
+    a, b = np.array(mine), np.array(theirs)
+    finite = np.isfinite(b)
+    return difference(a[finite], b[finite]) if np.array_equal(a[~finite], b[~finite]) else np.inf

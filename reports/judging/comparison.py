@@ -68,12 +68,13 @@ def judged(
     check_names(case)
     expect(truth, [entry.run for entry in entries if entry.run is not None], case)
     trusted = shortened(truth)
+    begun = [entry.engine for entry in entries if entry.run is not None and len(entry.run.t) > 1]
     rows = [row for entry in entries for row in verdicts(case, entry, trusted, command, begin)]
     return [
         *rows,
         *truth_row(case, truth, command),
         *_idle(case, rows, command),
-        *blind(case, trusted, command, [entry.engine for entry in entries if entry.run is not None]),
+        *blind(case, trusted, command, begun),
     ]
 
 

@@ -33,7 +33,7 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
     from crossbody.reports.judging import known
     from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
-    from crossbody.reports.judging.planted import PART
+    from crossbody.reports.judging.planted import PART, unturned
 
     near = Judge(case, JUDGED, truth, command)
     far = Judge(case, JUDGED, replace(truth, grows=FAR), command)
@@ -61,6 +61,9 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
         else:
             why = f"A control is not seen as it is: {fault} must come out between {least:.3g} and {most:.3g}."
         yield of_truth(case, f"{name} (control)", why, command, tier=truth.tier.value, value=value)
+    if unturned(case, truth.trajectory):
+        why = "No control: nothing slides fast enough in this motion for its friction to be turned."
+        yield of_truth(case, "friction_angle (control)", why, command, verdict=Word.INFO)
     for name, fault in _unsaid(near):
         word = next((one for one in WRONG if exit_code([one])), Word.OUTSIDE)
         yield of_truth(case, f"{name} (control)", f"A control passes: {fault}.", command, verdict=word)

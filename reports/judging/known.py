@@ -29,8 +29,9 @@ KINDS = (
     "judging.known_growth", "judging.known_parts", "judging.known_steps", "judging.known_tables",
     "judging.known_equations", "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
     "judging.known_verdicts", "judging.known_audits", "judging.known_arithmetic", "judging.known_samples",
+    "judging.known_places",
 )  # fmt: skip
-OF_FILES = ("judging.known_files",)
+OF_FILES = ("judging.known_files", "judging.known_margins")
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
 OF_SCENES = ("judging.known_scenes", "judging.known_turns")
 """Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
@@ -65,9 +65,14 @@ Asked = tuple[str, Any, Any]
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what was read, as it is, least and most, and of which file; nothing where no compiler is installed."""
+    return unlike_read(_mjcf, _urdf, _start)
+
+
+def unlike_read(*kinds: Callable[[], Iterable[Asked]]) -> tuple[Found, ...]:
+    """Return what of these is another than it must be, as `wrong`."""
     return tuple(
         (f"reader of {kind.__name__.strip('_')}", *one, what)
-        for kind in ((_mjcf, _urdf, _start) if find_spec("mujoco") else ())
+        for kind in (kinds if find_spec("mujoco") else ())
         for what, mine, right in rows_of(kind, lambda why: (why, np.nan, ""))  # what cannot be read has no numbers
         if (one := _off(mine, right))
     )
@@ -87,7 +92,8 @@ def _off(mine: Any, right: Any) -> tuple[float, Range] | None:
     return (float(a[worst]), (float(b[worst]),) * 2) if not off[worst] <= 0.0 else None
 
 
-def _scene(text: str, name: str) -> Scene:
+def scene_of(text: str, name: str) -> Scene:
+    """Return the scene that is read from a text, under the name of a file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
         path.write_text(text, encoding="utf-8")
@@ -96,12 +102,13 @@ def _scene(text: str, name: str) -> Scene:
     return scene
 
 
-def _softened(dmax: float, time: float, ratio: float) -> tuple[float, float]:
+def softened(dmax: float, time: float, ratio: float) -> tuple[float, float]:
     """Return a0 and a1 of a row by its largest impedance, its time and its damping ratio."""
     return 1.0 / (dmax * time**2 * ratio**2), 2.0 / (dmax * time)
 
 
-def _fields(scene: Scene, group: str, name: str, wanted: dict[str, Any]) -> Iterator[Asked]:
+def fields(scene: Scene, group: str, name: str, wanted: dict[str, Any]) -> Iterator[Asked]:
+    """Yield fields of a part of a scene, and what they must be."""
     part = next(one for one in getattr(scene, group) if one.name == name)
     for key, right in wanted.items():
         mine = (part.law.a0, part.law.a1) if key == "law" else getattr(part, key)
@@ -109,7 +116,7 @@ def _fields(scene: Scene, group: str, name: str, wanted: dict[str, Any]) -> Iter
 
 
 def _mjcf() -> Iterator[Asked]:
-    scene, usual, turn = _scene(MJCF, "known.xml"), _softened(DMAX, WEAK, 1.0), math.radians
+    scene, usual, turn = scene_of(MJCF, "known.xml"), softened(DMAX, WEAK, 1.0), math.radians
     mass, half = 500.0 * 8.0 * 0.1 * 0.2 * 0.3, math.sqrt(0.5)
     box = [mass * (b * b + c * c) / 3.0 for b, c in ((0.2, 0.3), (0.1, 0.3), (0.1, 0.2))]
     free, passive = (-np.inf, np.inf), {"armature": 0.02, "damping": (0.3, 0.04, 0.005), "friction_loss": 0.1}
@@ -124,7 +131,7 @@ def _mjcf() -> Iterator[Asked]:
             "rest": turn(10.0), "stiffness": (2.0, 0.6, 0.07), "law": usual, "force_range": free,
         },
         ("joints", "slide"): passive | {"type": "slide", "axis": (0.0, 0.0, 1.0), "range": (-0.4, 0.5), "rest": 0.0,
-                                        "stiffness": (0.0, 0.0, 0.0), "law": _softened(DMAX, STIFF, 0.5)},
+                                        "stiffness": (0.0, 0.0, 0.0), "law": softened(DMAX, STIFF, 0.5)},
         ("loops", "gear"): {"type": "joint", "first": "slide", "second": "turn",
                             "polynomial": (0.1, 0.2, 0.3, 0.0, 0.0), "law": (400.0 / DMAX, 30.0 / DMAX)},
         ("tendons", "rope"): {"coefficients": (2.0, -3.0), "stiffness": (5.0, 0.0, 0.0), "damping": (0.5, 0.0, 0.0),
@@ -137,10 +144,10 @@ def _mjcf() -> Iterator[Asked]:
         ("actuators", "sum"): {"activation": "integrator", "tendon": "rope", "gain": (3.0, 0.0, 0.0),
                                "bias": (1.0, 2.0, 3.0)},
         ("shapes", "box"): {"type": "box", "size": (0.1, 0.2, 0.3), "body": "arm"},
-        ("pairs", "floor:box"): {"friction": (0.7, 0.7, 0.0, 0.0, 0.0), "law": _softened(*MIXED), "dimension": 3},
+        ("pairs", "floor:box"): {"friction": (0.7, 0.7, 0.0, 0.0, 0.0), "law": softened(*MIXED), "dimension": 3},
     }  # fmt: skip
     for (group, name), wanted in parts.items():
-        yield from _fields(scene, group, name, wanted)
+        yield from fields(scene, group, name, wanted)
 
 
 def _turned(roll: float, pitch: float, yaw: float) -> Floats:
@@ -154,14 +161,14 @@ def _turned(roll: float, pitch: float, yaw: float) -> Floats:
 
 
 def _urdf() -> Iterator[Asked]:
-    scene = _scene(URDF, "known.urdf")
+    scene = scene_of(URDF, "known.urdf")
     own, R = np.array([[0.03, 0.002, 0.004], [0.002, 0.05, -0.003], [0.004, -0.003, 0.04]]), _turned(0.3, 0.5, 0.7)
     about, stands = R @ own @ R.T, _turned(0.2, -0.4, 0.9)
     six = [about[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    yield from _fields(scene, "bodies", "arm", {
+    yield from fields(scene, "bodies", "arm", {
         "position": (0.0, 0.1, 1.0), "mass": 1.4, "com": (0.1, 0.02, -0.03), "inertia": six,
     })  # fmt: skip
-    yield from _fields(scene, "joints", "turn", {
+    yield from fields(scene, "joints", "turn", {
         "type": "hinge", "axis": (0.0, 1.0, 0.0), "range": (-1.0, 2.0), "force_range": (-50.0, 50.0),
         "damping": (0.05, 0.0, 0.0), "friction_loss": 0.2,
     })  # fmt: skip

@@ -23,8 +23,8 @@ from crossbody.reports.measuring.truth import Truth
 SEED, ORDER, STEPS = 5, 1.5, (0.4, 0.2, 0.1)
 NEAR = 1e-3
 """Part of its size by which a coordinate is off: less than by what another clock makes of it."""
-SAME = 1e-9
-"""Part of the largest that rounding changes of any."""
+SAME, DIGITS = 1e-9, 1e-5
+"""Parts of the largest that rounding changes of any, and of an instant that its digits leave out."""
 
 
 @dataclass(frozen=True)
@@ -135,11 +135,22 @@ def _of_steps(made: MadeUp, errors: Errors) -> Iterator[Found]:
         study = Study(setting="dt", sizes=STEPS, runs=runs, built=runs[0] if read else None)
         found = splits(made.case, made.truth, judged, study)
         yield from _unlike("position", found.get("position"), *_parts(errors, by, read))
+        yield from _misplaced(made, errors, by, read, found)
         if not read:
             yield from _unlike("event_times", found.get("event_times"), *_shares(made, errors, by))
             said = found["position"].says if "position" in found else ""
             if f"Order {ORDER:.2f}" not in said:
                 yield part_of("position", "step"), np.nan, (ORDER, ORDER), "the order of an error of known parts"
+
+
+def _misplaced(made: MadeUp, errors: Errors, by: float, read: float, found: Mapping[str, Split]) -> Iterator[Found]:
+    """Yield the truth's instant that is named as that of the largest error, where it or the coordinate is another."""
+    i, j = int(np.argmax(errors.size)), int(np.argmax(np.abs(errors.a + by * errors.b + read * errors.c)))
+    name, t = made.case.coordinates[j].name, float(made.t[i])
+    said = found["position"].where.partition(" at t = ") if "position" in found else ("", "", "")
+    told = float(said[2].removesuffix(" s") or np.nan)
+    if said[0] != name or not abs(told - t) <= DIGITS * t:
+        yield part_of("position", "step"), told, (t, t), f"the instant at which {name} is off most: {said[0]}"
 
 
 def _of_tolerances(made: MadeUp, errors: Errors) -> Iterator[Found]:

@@ -622,17 +622,27 @@ def friction(plain: Plain) -> Iterator[Control]:
     yield from _creeping(
         plain, [way for row, way in zip(rows, ways, strict=True) if plain.run.mode[-1, row] == Mode.STICK]
     )
-    for k in plain.draw.permutation(len(rows)).tolist() if most > 0.0 else ():
-        slides = plain.run.mode[:, rows[k]] == Mode.SLIP
-        lower = bound[:, k] < (1.0 - TENTH) * most  # than the hardest: it tells the bound of each from that of all
-        among = slides & (bound[:, k] > TENTH * most)
-        at = plain.samples(among & lower if (among & lower)[plain.quiet].any() else among)[:1]
-        for i in at:
-            yield _exceeded(plain, i, k)
-        for i in plain.samples(among & _fast(plain, ways, k))[:1]:
-            yield from _turned_aside(plain, i, k)
-        if at:
-            return
+    hard = bound > TENTH * most
+    slides = hard & (plain.run.mode[:, rows] == Mode.SLIP)
+    lower = bound < (1.0 - TENTH) * most  # than the hardest: it tells the bound of each from that of all
+    places = plain.draw.permutation(len(rows)).tolist() if most > 0.0 else []
+    for k in places:
+        some = slides[:, k] & lower[:, k]
+        if at := plain.samples(some if some[plain.quiet].any() else slides[:, k])[:1]:
+            yield _exceeded(plain, at[0], k)
+            break
+    for k in places:
+        if at := plain.samples(slides[:, k] & _fast(plain, ways, k))[:1]:
+            yield from _turned_aside(plain, at[0], k)
+            break
+
+
+def unturned(case: Case, run: Trajectory) -> bool:
+    """Whether friction may point any way of a plane, and nothing slides by enough for a turn of it to be a fault."""
+    system = equations(case)
+    if system is None or not system.frictional or not (system.tangents > 1).any():
+        return False
+    return not any("friction_angle" in control.sees for control in friction(Plain(case, run)))
 
 
 def _cumulated(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:

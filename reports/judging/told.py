@@ -18,9 +18,9 @@ WRONG = (Word.CRASHED, Word.OUTSIDE)
 SHORT = re.compile(r"(?:Followed|Known up) to (.*? s)(?: of .*? s)?: (.*?)\.(?: |$)")
 """What a truth's row says of a horizon shorter than was asked for, or a motion known in part."""
 FINISHED = "finished"  # the row that says whether a run came to its end
-_CLAUSE = re.compile(r"[:;,.](?:\s|$)")
-"""What ends the first clause of a reason."""
-_WHERE = re.compile(r"\bby (\S+) (\S+) at ")
+_CLAUSE = re.compile(r"[:;.](?:\s|$)")
+"""What ends the first statement of a reason; a comma does not, which stands in lists."""
+_WHERE = re.compile(r"\bby (\S+) (\S.*?) at ")
 """How far a coordinate is off, and its unit, as a number of position says it."""
 NAMED = 3  # runs that the sentence names
 QUANTITIES = frozenset(
@@ -241,7 +241,7 @@ def _off(run: EngineRun, row: Row) -> str:
 
 
 def _caused(some: Sequence[tuple[EngineRun, Row]]) -> list[str]:
-    """Numbers beyond their limits; behind the last of those that are named with one cause, its first clause."""
+    """Numbers beyond their limits; behind the last of those that are named with one cause, its first statement."""
     causes = [_CLAUSE.split(row["why"].removeprefix(UNMEASURED))[0] for _, row in some]
     return [
         _off(run, row) + (f": {cause[:1].upper()}{cause[1:]}" if cause and (k == NAMED or cause != after) else "")

@@ -21,6 +21,7 @@ from crossbody.reports.judging.stored import changed
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
+from crossbody.reports.measuring.slow_slips import firm_until
 from crossbody.reports.measuring.truth import Truth, sample_times, shortened
 
 SECOND = 10.0
@@ -141,6 +142,10 @@ def _integrated(case: Case, first: Trajectory, other: str, budget: float = BUDGE
         apart = f"they diverge at t = {truth.parted:.4g} s, by exp({truth.growth:.3g} t)"
         ended = f"{second.name} ends {second.run.outcome.value} at t = {truth.parted:.4g} s"
         source += f"; {ended if math.isnan(truth.growth) else apart}"
+    if case.rubs:
+        truth = replace(truth, firm=firm_until(truth, second.run, second.rtol, case))
+    if truth.firm < min(case.t_end, truth.trusted):
+        source += f"; impulses of friction are told up to t = {truth.firm:.4g} s, as slips are too slow behind it"
     return _rechecked(replace(truth, source=source), case)
 
 
@@ -273,8 +278,8 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
         return None
     reasons = [
         (truth.trajectory.determined_until, "the law does not determine the normal forces of sliding contacts"),
-        (
-            truth.trajectory.unique_until,
+        (  # what either has found is so, whatever the bound by which the other did not look for it
+            min(truth.trajectory.unique_until, second.unique_until),
             "several sets of sticking, sliding and open contacts satisfy the law, or none is known to",
         ),
         (_arbitrary(truth, second, case), "the law does not determine which of several dependent rows opens first"),

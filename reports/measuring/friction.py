@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats, distinct
+from crossbody.cases.defaults import TOLERANCE
 from crossbody.cases.remembered import remembered
 from crossbody.cases.scene_contacts import contacts
 from crossbody.reports.measuring.equations import equations
+from crossbody.reports.measuring.impulse import stopping
 from crossbody.reports.measuring.scale import RESTS
 
 
@@ -46,6 +48,7 @@ class Rubbing:
 
 SLOW = 1e-3  # part of the largest slip, and of the largest force, below which a direction is not looked at
 BOUND, SLIP = 1e-6, 1e-5  # of the largest bound and slip: to what limits hold friction and velocities
+RUBS = (Mode.STICK, Mode.SLIP)  # modes in which a place touches and is rubbed
 SHORT = 1e-6  # m, or rad, to which positions are judged: a slide is not known to be one if it is shorter
 
 
@@ -109,12 +112,31 @@ def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats,
     return (run.mode[:, found.rows] == Mode.SLIP) & quick & firm, speed, force
 
 
+def least_directed(run: Trajectory) -> float:
+    """Return the speed below which a slip has no direction, m/s: ten times what the tolerance of limits leaves of any.
+
+    There the reference takes it for none.
+    """
+    return 10.0 * TOLERANCE * float(np.max(np.abs(run.v), initial=0.0))
+
+
+def directed(run: Trajectory, found: Rubbing) -> NDArray[np.bool_]:
+    """Samples (n,) at which friction is told by what slips: none stops there, or is too slow to have a direction.
+
+    Friction of one that has none may point anywhere, and what others bear follows it.
+    """
+    slides = run.mode[:, found.rows] == Mode.SLIP
+    slow = slides & (np.linalg.norm(found.slip, axis=-1) < least_directed(run))
+    return np.asarray(~(slow.any(axis=1) | stopping(run)))
+
+
 def off_bound(run: Trajectory, case: Case) -> float:
-    """Return how far friction of what slides is at most from mu lam_n, N, whatever its direction; 0 without slides."""
+    """Return how far friction of what slides in some direction is at most from mu lam_n, N; 0 without slides."""
     if (found := rubbing(run, case)) is None:
         return 0.0
     off = np.linalg.norm(found.force, axis=-1) - found.mu * found.normal
-    return float(np.max(np.abs(off), initial=0.0, where=run.mode[:, found.rows] == Mode.SLIP))
+    slides = (run.mode[:, found.rows] == Mode.SLIP) & directed(run, found)[:, None]
+    return float(np.max(np.abs(off), initial=0.0, where=slides))
 
 
 def cumulated(run: Trajectory, values: Floats) -> Floats:
@@ -151,7 +173,7 @@ def guard(truth: Trajectory, case: Case, pair: int, slides: bool) -> tuple[Calla
             below = found.mu * found.normal - np.linalg.norm(found.force, axis=-1)
             least: Floats = np.where((mode == Mode.STICK) & own, below, np.inf).min(axis=1)
             return least
-        touches = np.isin(mode, (Mode.STICK, Mode.SLIP)) & own
+        touches = np.isin(mode, RUBS) & own
         fastest: Floats = np.where(touches, np.linalg.norm(found.slip, axis=-1), -np.inf).max(axis=1)
         return fastest
 
@@ -190,7 +212,8 @@ def _switches(run: Trajectory, rows: list[int]) -> Iterator[tuple[float, bool]]:
 
 
 def _way(run: Trajectory, found: Rubbing, places: NDArray[np.intp], start: float, end: float) -> float:
-    """Return how far any of some places slips from one instant to another, m, of joints rad."""
+    """Return how far any of some places slips while it touches from one instant to another, m, of joints rad."""
     inside = (run.t >= start) & (run.t <= end)
-    speed = np.linalg.norm(found.slip[inside][:, places], axis=-1)
+    touches = np.isin(run.mode[inside][:, found.rows[places]], RUBS)
+    speed = np.where(touches, np.linalg.norm(found.slip[inside][:, places], axis=-1), 0.0)
     return float(np.max(np.trapezoid(speed, run.t[inside], axis=0), initial=0.0))

@@ -59,15 +59,24 @@ def true_impulse(run: Trajectory, exact: Trajectory, whole: Trajectory) -> Float
     return np.stack([np.interp(exact.t, whole.t, row) for row in own.T], axis=1)
 
 
+def stopping(run: Trajectory) -> NDArray[np.bool_]:
+    """Samples (n,) at which a slip stops or turns, and still slides: its friction may have any direction there.
+
+    A slip that dies out may turn within nanoseconds, and its friction with it, and what others bear.
+    """
+    found = np.zeros(len(run.t), dtype=np.bool_)
+    for event in run.events:
+        if event.before == Mode.SLIP and event.after in (Mode.SLIP, Mode.STICK):
+            found |= (run.t == event.t) & (run.mode[:, event.contact] == Mode.SLIP)
+    return found
+
+
 def before_stops(run: Trajectory, exact: Trajectory) -> tuple[Trajectory, Trajectory]:
     """Return a run and the truth beside it with the multipliers of the sample before where a slip stops or turns.
 
-    A slip that dies out may turn within nanoseconds, and its friction with it: what it is at that instant tells nothing
-    of the step before it, for half of which the sample would stand.
+    What friction is at that instant tells nothing of the step before it, for half of which the sample would stand.
     """
-    ends = [event for event in run.events if event.before == Mode.SLIP and event.after in (Mode.SLIP, Mode.STICK)]
-    at = {i for e in ends for i in np.flatnonzero((run.t == e.t) & (run.mode[:, e.contact] == Mode.SLIP)).tolist()}
-    samples = np.array(sorted(at - {0}), dtype=np.intp)
+    samples = 1 + np.flatnonzero(stopping(run)[1:])
     return _held(run, samples), _held(exact, samples)
 
 

@@ -43,6 +43,7 @@ class Truth:
         grows: how many times more than in free flight an error of the start grows; 1 where it was
             not measured.
         tight: tolerance of the compiled run; NaN of another source.
+        firm: until when slips are fast enough to tell the direction of their friction, s.
         part: of the horizon that was asked for, up to which the motion is followed.
         short: why no further; empty if to the horizon.
         horizon: up to when a scene's motion can be known, and why no further, as measured; None
@@ -64,6 +65,7 @@ class Truth:
     growth: float = math.nan
     tight: float = math.nan
     grows: float = 1.0
+    firm: float = math.inf
     part: float = 1.0
     short: str = ""
     horizon: Chaos | None = None

@@ -19,7 +19,7 @@ from crossbody.reports.measuring.impulse import away, told
 from crossbody.reports.measuring.instants import off
 from crossbody.reports.measuring.placed import Placed, largest, of_rows, placed
 from crossbody.reports.measuring.scale import rounded
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth, taken
 from crossbody.reports.metrics.position import gap_scale_of
 
 UNITS = {
@@ -250,12 +250,30 @@ def penetration_error(truth: Truth, run: Trajectory, case: Case) -> float | None
 def release_count(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Contacts that ended in the run minus those of the truth: 0 if both release equally often.
 
-    Number of contacts of the run that ended minus the truth's; None without a row that touches.
+    Number of contacts of the run that ended minus the truth's; None without a row that touches. What ended in one
+    of them alone, and from there on bears no more in either than multipliers are known to, counts in neither.
     """
     if not case.law.touches.any():
         return None
     mine, theirs = (sum(np.isfinite(c.release) for c in truth.contacts(each)) for each in (run, truth.trajectory))
-    return float(mine - theirs)
+    pairs = [(a, b) for a, b in matched(truth, run) if np.isfinite(a.release) != np.isfinite(b.release)]
+    untold = sum(1 if np.isfinite(b.release) else -1 for a, b in pairs if _light(truth, run, a, b))
+    return float(mine - theirs - untold)
+
+
+def _light(truth: Truth, run: Trajectory, a: Contact, b: Contact) -> bool:
+    """Whether what ended in one motion alone bears no more there and here than is known, as in `event_times`.
+
+    The other one goes on, closed: else it has lost an event.
+    """
+    lam, known = _of_row(truth, "lam", a.row, CLOSED)
+    for motion, one in ((truth.trajectory, a), (run, b)):
+        behind = (motion.t > min(a.release, b.release)) & np.isin(motion.mode[:, a.row], CLOSED)
+        if not np.isfinite(one.release) and not behind.any():
+            return False
+        if not np.max(np.abs(lam(motion)[behind]), initial=0.0) <= truth.grows * known:
+            return False
+    return True
 
 
 def restitution_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -287,11 +305,25 @@ def stick_times(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 def _turned(truth: Truth, run: Trajectory, case: Case, slides: bool) -> float | None:
     """How far pairs are off that begin to slide, or hold, at most, s."""
-    pairs, mine = ([one[:2] for one in turned(each, case) if one[2] == slides] for each in (truth.trajectory, run))
+    motions = (truth.trajectory, run)
+    pairs, mine = ([one[:2] for one in turned(each, case) if one[2] == slides] for each in motions)
+    if not pairs and not mine:
+        return None
+    guarded = {pair: guard(truth.trajectory, case, pair, slides) for pair, _ in (*pairs, *mine)}
+    while len(pairs) != len(mine):
+        longer = max(pairs, mine, key=len)
+        if not _untold(truth, run, longer[-1][1], *guarded[longer[-1][0]]):
+            return None
+        longer.pop()
     if not pairs or [pair for pair, _ in pairs] != [pair for pair, _ in mine]:
         return None
-    guarded = {pair: guard(truth.trajectory, case, pair, slides) for pair, _ in pairs}
     return float(np.max([off(truth, t, found, *guarded[k]) for (k, t), (_, found) in zip(pairs, mine, strict=True)]))
+
+
+def _untold(truth: Truth, run: Trajectory, t: float, values: Callable[[Trajectory], Floats], known: float) -> bool:
+    """Whether a change that one motion has alone is none that is known: what brings it about is none from there on."""
+    behind = [taken(motion, motion.t >= t) for motion in (truth.trajectory, run)]
+    return all(len(one.t) and float(np.max(np.abs(values(one)))) <= truth.grows * known for one in behind)
 
 
 def touch_count(truth: Truth, run: Trajectory, case: Case) -> float | None:

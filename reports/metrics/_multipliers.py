@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.friction import directed, rubbing
 from crossbody.reports.measuring.impulse import away, before_stops, cumulative, told, true_impulse, with_collisions
 from crossbody.reports.measuring.placed import largest, of_rows
 from crossbody.reports.measuring.scale import idle
-from crossbody.reports.measuring.truth import Truth
+from crossbody.reports.measuring.truth import Truth, before
 
 UNITS: dict[str, str] = {}
 NEEDS = dict.fromkeys(("complementarity", "lam_error", "lam_impulse", "lam_impulse_path"), "lam")
@@ -23,17 +24,20 @@ def complementarity(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """How far the multipliers pull, or act where nothing touches, over the largest.
 
     Max of -lam and of |lam| where they are open, of rows that touch, over max |lam|; NaN where lam is not known. Rows
-    of friction push either way. Recomputed from lam, gap and mode, never an engine's own flag.
+    of friction push either way. Samples are left out at which friction of a slip may have any direction. Recomputed
+    from lam, gap and mode, never an engine's own flag.
     """
     rows = case.law.touches
     if not rows.any():
         return None
     if told(run) is None:
         return math.nan
-    lam = run.lam[:, rows]
+    lam, rubs = run.lam[:, rows], rubbing(run, case)
+    known = np.ones(len(run.t), dtype=bool) if rubs is None else directed(run, rubs)
     scale = float(np.max(np.abs(lam), initial=0.0))
     acting = np.where(_open(truth, run)[:, rows], np.abs(lam), 0.0)
     wrong = np.maximum(np.maximum(-lam, 0.0), acting)
+    wrong[~known] = 0.0
     return largest(wrong, run.t, of_rows(case, "N", "N m", rows), scale or 1.0)
 
 
@@ -93,8 +97,9 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
     its step. At the instant at which a slip stops its friction may have any direction: the sample before counts
     there. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
     known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
-    many; N s where only the run's does.
+    many; N s where only the run's does. Nothing is compared behind where slips are too slow to tell their friction.
     """
+    run = before(run, truth.firm) if truth.firm < math.inf else run
     inside, exact = aligned(truth, run, case, releases=True)
     if not inside.any() or truth.trajectory.counts.get("redundant", 0):
         return None

@@ -6,7 +6,7 @@ import numpy as np
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
-from crossbody.reports.measuring.friction import cumulated, rubbing, sliding
+from crossbody.reports.measuring.friction import cumulated, directed, rubbing, sliding
 
 UNITS = {
     "creep_speed": "m/s", "friction_angle": "rad", "friction_impulse": "N s", "friction_power": "W",
@@ -18,12 +18,13 @@ ALWAYS = True
 
 
 def cone_violation(run: Trajectory, case: Case) -> float | None:
-    """How far friction exceeds mu times the normal force, over the largest bound."""
+    """How far friction exceeds mu times the normal force, over the largest bound, where slips have directions."""
     if (found := rubbing(run, case)) is None:
         return None
     bound = found.mu * found.normal
     most = float(np.max(bound, initial=0.0))
-    return float(np.max(np.linalg.norm(found.force, axis=-1) - bound, initial=0.0)) / most if most > 0.0 else None
+    over = (np.linalg.norm(found.force, axis=-1) - bound)[directed(run, found)]
+    return float(np.max(over, initial=0.0)) / most if most > 0.0 else None
 
 
 def creep_speed(run: Trajectory, case: Case) -> float | None:
@@ -35,10 +36,11 @@ def creep_speed(run: Trajectory, case: Case) -> float | None:
 
 
 def friction_angle(run: Trajectory, case: Case) -> float | None:
-    """Largest angle between friction and the direction opposite to the slip, where a contact slides."""
+    """Largest angle between friction and the direction opposite to the slip, where one slides and all have some."""
     if (found := rubbing(run, case)) is None:
         return None
     slides, speed, force = sliding(run, found)
+    slides &= directed(run, found)[:, None]
     if not slides.any():
         return None
     off = found.slip[slides] / speed[slides][:, None] + found.force[slides] / force[slides][:, None]

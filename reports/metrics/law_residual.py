@@ -22,7 +22,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reference import System
 from crossbody.reports.measuring.equations import equations, finite, spread
-from crossbody.reports.measuring.friction import off_bound
+from crossbody.reports.measuring.friction import directed, off_bound, rubbing
 from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
@@ -148,6 +148,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     worst, scale = off_bound(run, case), 0.0
     slides = (run.mode == Mode.SLIP) & (np.asarray(system.follows) >= 0)
     chosen = spread(run, looked)
+    if (rubs := rubbing(run, case)) is not None:
+        chosen = chosen[directed(run, rubs)[chosen]]
     patterns, which = np.unique(
         np.stack([closed & ~slides, slides, run.mode == Mode.COLLISION], axis=1)[chosen], axis=0, return_inverse=True
     )

@@ -477,6 +477,8 @@ def note(name: str, traces: Sequence[Trace], limits: Limits = NONE) -> str:
         without := [label(one) for one in traces if one.run.ledger is None and label(one) != TRUTH]
     ):
         told.append(f"Only the total energy is drawn of engines without an account of work: {', '.join(without)}.")
+    if name == "inputs" and any(one.about.get("asked_again") for one in traces):
+        told.append(ASKED_AGAIN)
     if name == "modes":
         told += [*_same(traces), *_throughout(traces)]
     return " ".join(filter(None, told))
@@ -510,6 +512,7 @@ def _throughout(traces: Sequence[Trace]) -> Iterator[str]:
 
 
 MATCHED = "Coordinates, and |difference from the truth|, impacts matched"
+ASKED_AGAIN = "What the controller of the case gives is computed again from each run's own motion, at its ticks."
 ROTATIONS = "A rotation is drawn by its angle from the truth's start, its error by the angle between both."
 LOG_NOTE = (
     "Every window starts from the measured state, where the difference is zero. Differences below a millionth of the "

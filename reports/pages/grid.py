@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from crossbody.reports import metrics
 from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import FINISHED, WRONG, beyond, distance, lacking, runs_of, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
@@ -69,7 +70,7 @@ class Cell:
 class Line:
     """One line: its name, what stands beside it, the page that it leads to, a cell for every engine, and a sketch.
 
-    The sketch is a line of points in a box of 100 by 20, as SVG writes them.
+    The sketch is a line of points in a box of 100 by 20, as SVG writes them. The title says what the line means.
     """
 
     text: str
@@ -77,6 +78,7 @@ class Line:
     small: str = ""
     page: str = ""
     sketch: str = ""
+    title: str = ""
 
 
 def heads(engines: Sequence[str]) -> list[dict[str, Any]]:
@@ -167,9 +169,21 @@ def of_case(rows: Sequence[Row], page: str, label: str, walls: Mapping[str, floa
 
 
 def ran(rows: Sequence[Row]) -> list[str]:
-    """Return the engines that have a number in some row; all where none has."""
-    skipped = {row["who"] for row in rows} - {row["who"] for row in rows if row["verdict"] != Word.SKIPPED}
-    return [who for who in names(rows) if who not in skipped] or names(rows)
+    """Return the engines that have a number in some row, those first that are off; all where none has."""
+    order, mine = names(rows), by(rows, "who")
+    rank = {who: _rank(mine[who]) for who in order}
+    group = {who: who.partition(":")[0] for who in order}
+    first = {engine: min(rank[who] for who in order if group[who] == engine) for engine in group.values()}
+    order.sort(key=lambda who: (group[who] == TRUTH, first[group[who]]))
+    shown = [who for who in order if any(row["verdict"] != Word.SKIPPED for row in mine[who])] or order
+    places = {engine: k for k, engine in enumerate(dict.fromkeys(group[who] for who in shown))}
+    return sorted(shown, key=lambda who: (places[group[who]], rank[who]))
+
+
+def _rank(rows: Sequence[Row]) -> int:
+    """Return how bad the worst word of some rows is, 0 the worst."""
+    word = worst(rows)[0]
+    return RANKED.index(word) if word in RANKED else len(RANKED)
 
 
 def _none(who: str) -> Cell:
@@ -196,10 +210,16 @@ def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Se
         Line(
             text=name,
             small=units[name],
+            title=_meaning(name),
             cells=[_value(values[who][name], page) if name in values[who] else _none(who) for who in engines],
         )
         for name in order
     ]
+
+
+def _meaning(metric: str) -> str:
+    """Say what a metric measures; nothing of those that a case brings along, and of parts of errors."""
+    return metrics.summary(metric) if metric in metrics.names() else ""
 
 
 def _urgent(row: Row) -> tuple[Any, ...]:

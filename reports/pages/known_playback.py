@@ -95,7 +95,7 @@ def _words() -> Iterator[Said]:
     """Yield what is said of every change of mode, one a second."""
     made, pairs = drawn().traces[0], [(one, two) for one in Mode for two in Mode if one != two]
     events = tuple(Event(t=float(k), contact=0, before=one, after=two) for k, (one, two) in enumerate(pairs))
-    instants, told = playback.happens(replace(made, run=replace(made.run, events=events)), 0.0)
+    instants, told = playback.happens(replace(made, run=replace(made.run, events=events)))
     yield "instants of all changes", instants, [e.t for e in events]
     touches = {("FREE", "CONTACT"), ("FREE", "COLLISION")}
     words = ["touches" if (a.name, b.name) in touches else WORDS[b.name] for a, b in pairs]

@@ -28,7 +28,7 @@ BLOWS = 200
 those that are near put together."""
 FEW = 2  # contacts, and what they do, that are named of one instant
 FRAMES = 600
-"""Frames of a motion at its usual speed: what an engine does within one of them is one event."""
+"""Frames of a motion at its usual speed: what engines do within one of them, beside the truth, is one event."""
 HAPPENS = {
     Mode.FREE: "opens", Mode.CONTACT: "presses", Mode.BALLISTIC: "lets go below the surface",
     Mode.COLLISION: "collides", Mode.COLLISION_SEPARATION: "separates", Mode.BILATERAL: "holds", Mode.STICK: "sticks",
@@ -85,7 +85,7 @@ def packed(traces: Sequence[Trace], scene: scenes.Scene, share: float = 1.0) -> 
     drawn = [_track(trace, scene, parameters, instants, pushing) for trace in moved]
     end = max((float(trace.run.t[-1]) for trace in moved), default=0.0)
     for trace, track in zip(moved, drawn, strict=True):
-        track["happens"] = happens(trace, 0.0 if track["truth"] else end / FRAMES)
+        track["happens"] = happens(trace)
     return {
         "stage": asdict(stage) | {"dimensions": stage.dimensions}, "tracks": drawn,
         "end": end, "frame": end / FRAMES,
@@ -108,15 +108,15 @@ def _pushing(
     return found
 
 
-def happens(trace: Trace, within: float) -> tuple[list[float], list[str]]:
+def happens(trace: Trace) -> tuple[list[float], list[str]]:
     """Instants of one motion that the buttons lead to, s, and what happens there in a few words.
 
-    Events are put together that come within so long after a first one, s: longer where there are very many.
+    Events of one instant are put together; of very many those that are near.
     """
     events = sorted(trace.run.events, key=lambda event: event.t)
-    found = _together(events, within)
+    found = _together(events, 0.0)
     if len(found) > BLOWS:
-        found = _together(events, max(within, (events[-1].t - events[0].t) / (BLOWS - 1)))
+        found = _together(events, (events[-1].t - events[0].t) / (BLOWS - 1))
     return [each[0].t for each in found], [_said(each, trace.about["contacts"]) for each in found]
 
 

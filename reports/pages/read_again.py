@@ -35,7 +35,7 @@ _TILE = re.compile(r'<li class="[^"]*"><strong>(\d+)</strong> ([^<]*)</li>')
 _DATA = re.compile(r'data-(v|name|engine)="([^"]*)"')
 _TAGS = re.compile(r"<[^>]*>")
 _PLACE = re.compile(r" \(([^()]* by [^()]* at [^()]*)\)$")
-_OFF = re.compile(r"by (\S+ \S+) at ")
+_OFF = re.compile(r"by (\S+ \S.*?) at ")
 _CHIPS = re.compile(r'<p class="counts">(.*?)</p>', re.DOTALL)
 _NUMBER = re.compile(r"(?:< )?(-?(?:\d[\d.]*(?:e[+-]\d+)?|inf))$")
 

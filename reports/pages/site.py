@@ -16,7 +16,7 @@ from crossbody.reports.judging.told import WRONG
 from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
-from crossbody.reports.pages.results import Results, read
+from crossbody.reports.pages.results import Results, read, verdicts_of
 from crossbody.reports.runs import beside, manifest, output
 from crossbody.reports.runs.manifest import INDEX, PAGE
 from crossbody.reports.runs.origin import BROKEN, blamed
@@ -41,10 +41,25 @@ def write(out: Path, *, single_file: bool = False, against: Path | None = None, 
     if output.is_staged(out):
         _make(out, single_file, against, others)
         return out / PAGE
-    output.require_ours(out, "run")
+    _require(out, against, others)
     with output.folder(out, "report", adds=True) as made:
         _make(made, single_file, against, others)
     return out / PAGE
+
+
+def _require(out: Path, against: Path | None, others: Sequence[Path]) -> None:
+    """Say of all folders that are asked for what is wrong with them, not of the first one alone."""
+    asks: list[Callable[[], object]] = [lambda: output.require_ours(out, "run")]
+    asks += [lambda one=one: beside.tables(one) for one in others if one.resolve() != out.resolve()]  # type: ignore[misc]
+    asks += [] if against is None else [lambda: verdicts_of(against)]
+    wrong: dict[str, None] = {}
+    for ask in asks:
+        try:
+            ask()
+        except OutputError as error:
+            wrong[str(error)] = None
+    if wrong:
+        raise OutputError(" ".join(wrong))
 
 
 def pages_of(out: Path) -> set[str]:

@@ -28,7 +28,9 @@ from crossbody.reports.judging.forces_of_scene import forces_of_scene
 from crossbody.reports.judging.form_of_case import form_of_case
 from crossbody.reports.judging.reach import BUDGET, estimated
 from crossbody.reports.judging.run_verdicts import Entry, crash
+from crossbody.reports.judging.steps_taken import runaway
 from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
+from crossbody.reports.judging.units_of_scene import units_of_scene
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
 from crossbody.reports.runs.choice import Pick, check_known, of_case, of_pick, offered
@@ -216,12 +218,15 @@ def _ran(
         raise CaseUnsupported(dear)
     bounded = _bounded(case, pick)
     prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
+    if why := runaway(case, prepared.settings, lambda first, more: prepare(first, pick, {**asked, **more})):
+        stopped = replace(of_start(case, why), outcome=Outcome.STEP_LIMIT)
+        return Entry(engine=pick.engine, profile=pick.profile, settings=prepared.settings, run=stopped)
     shown = _of_engine(pick, "audit", prepared.audit(), Mapping, "a mapping")  # type: ignore[type-abstract]
     hidden = {**engines.load(pick.engine).hidden_in(prepared.profile), **shown.get("hidden", {})}
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     own = {name: value for name, value in asked.items() if name in prepared.settings}
     rows += settings_kept(shown, prepared.settings)
-    rows += (*forces_of_scene(case), *form_of_case(case))
+    rows += (*forces_of_scene(case), *form_of_case(case), *units_of_scene(case))
     if case.file:
         from crossbody.reports.judging.start_of_file import start_of_file  # parsers that other cases do without
 

@@ -237,11 +237,15 @@ def _beside(truth: Truth, run: Trajectory, case: Case) -> Trajectory | None:
 
 def _inputs(case: Case, run: Trajectory) -> dict[str, Any]:
     """Names, instants and values (nu, m) of what acted on a run from outside, as many as a plot shows; if anything."""
-    given = case.inputs if run.inputs is None else run.inputs
+    from crossbody.reports.measuring.controlled import acting  # numba, which a page does without
+
+    given = acting(case, run)
     if given is None or not given.names or not len(given.times):
         return {}
     kept = distinct(*(keep(given.times, column, np.zeros(0)) for column in given.values.T))
-    return {"inputs": [list(given.names), given.times[kept].tolist(), given.values[kept].T.tolist()]}
+    again = given is not case.inputs and given is not run.inputs
+    told = {"inputs": [list(given.names), given.times[kept].tolist(), given.values[kept].T.tolist()]}
+    return told | {"asked_again": again}
 
 
 def _steps(t: Floats) -> list[list[float]]:

@@ -71,8 +71,9 @@ def _analysis(out: Path) -> tuple[Section, ...]:
              "map": draw.map_figure}  # fmt: skip
     names = {*drawn, *(name for _, name, _ in words.ANALYSIS_TABLES)}
     found = {name: _rows(out, f"{ANALYSIS}{name}") for name in names if _has(out, f"{ANALYSIS}{name}")}
+    more = {"locus": (found["limits"],)} if "limits" in found else {}
     plots = tuple(
-        Plot(name=f"{ANALYSIS}{name}", figure=figure(found[name]))
+        Plot(name=f"{ANALYSIS}{name}", figure=figure(found[name], *more.get(name, ())))
         for name, figure in drawn.items()
         if len(found.get(name, ()))
     )
@@ -81,8 +82,11 @@ def _analysis(out: Path) -> tuple[Section, ...]:
         for title, name, shown in words.ANALYSIS_TABLES
         if len(found.get(name, ()))
     )
-    title = STUDIES["analysis"].TITLE
-    return (Section(name="analysis", title=title, text=words.ANALYSIS_TEXT, plots=plots, tables=tables),)
+    title, says = STUDIES["analysis"].TITLE, ""
+    if _has(out, f"{ANALYSIS}says"):
+        (first,) = _rows(out, f"{ANALYSIS}says").to_dict(orient="records")
+        title, says = f"{title} of {first['case']}", str(first["says"])
+    return (Section(name="analysis", title=title, says=says, text=words.ANALYSIS_TEXT, plots=plots, tables=tables),)
 
 
 def _bode(out: Path) -> Iterator[Plot]:

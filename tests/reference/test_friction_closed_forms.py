@@ -109,6 +109,19 @@ def test_any_oblique_slide_stops_on_time(block: int) -> None:
         assert all(off < 10.0 * rtol * max(t, lost) for off, rtol in zip(errors, rtols, strict=True)), (kappa, th)
 
 
+def test_the_second_machine_stops_an_oblique_slide_on_time() -> None:
+    """Also where friction is hardly more than the weight pulls."""
+    rng, rtol = np.random.default_rng(76), 1e-10
+    for _ in range(8):
+        kappa, tangent = 1.0 + 10.0 ** rng.uniform(-2.3, 0.0), rng.uniform(0.1, 0.8)
+        speed, th = 10.0 ** rng.uniform(-1.0, 0.5), np.radians(rng.uniform(3.0, 177.0))
+        t, brake = stops_at(kappa, tangent, speed, th)
+        system = point(kappa * tangent, np.arctan(tangent), space=True)
+        start = [speed * np.cos(th), speed * np.sin(th), 0]
+        [(found, *_)] = moved(simulate(system, [0, 0, 0], start, 1.2 * t, rtol=rtol, solver="cvode"))
+        assert abs(found - t) < 10.0 * rtol * max(t, speed / brake), (kappa, th)
+
+
 def test_box_stops_flat_at_one_event() -> None:
     run_ = run(box_on_floor(0.3), [0, 0, 0.1, 1, 0, 0, 0], [1.0, 0, 0, 0, 0, 0], 0.6)
     stops = {e.t for e in run_.events if e.t > 0.0}

@@ -64,6 +64,41 @@ def test_every_contact_has_its_own_peak(name, rtol):
     assert contacts
 
 
+def pressed(a0, a1, speed, until):
+    """Largest multiplier of a mass of 1 kg that comes to a row, falling at 9.81 m/s^2: q = A exp(-d t) sin(w t)."""
+    d, w = a1 / 2.0, np.sqrt(a0 - a1**2 / 4.0)
+    low, high = 0.0, until
+    for _ in range(12):  # a grid around the largest of the grid before
+        t = np.linspace(low, high, 201)
+        fall, swing = np.exp(-d * t), (np.cos(w * t), np.sin(w * t))
+        # q'' = -a1 q' - a0 q, from q = 0 and q' = -speed
+        lam = fall * speed * (a1 * swing[0] + (a0 - d * a1) / w * swing[1]) + 9.81
+        k = int(np.argmax(lam))
+        low, high = t[max(k - 1, 0)], t[min(k + 1, 200)]
+    return lam.max()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_presses_most_in_a_bounce_is_written_down(seed):
+    """Wherever the peak stands in a step, just behind its start too: lam = q'' + 9.81 is known in closed form."""
+    draw = np.random.default_rng(seed)
+    for _ in range(8):
+        a0, rtol, height = (
+            10.0 ** draw.uniform(2.0, 6.0),
+            10.0 ** draw.uniform(-11.0, -5.0),
+            10.0 ** draw.uniform(-2, 0.5),
+        )
+        a1, speed = 2.0 * np.sqrt(a0) * draw.uniform(0.0, 0.95), np.sqrt(2.0 * 9.81 * height)
+        fall = speed / 9.81
+        run = simulate(
+            ball(a0=a0, a1=a1, a2=0.0), [height], [0.0], fall + 8.0 / np.sqrt(a0), rtol=rtol, shortcuts=False
+        )
+        touch = next(event.t for event in run.events if event.before is Mode.FREE)
+        ends = next((event.t for event in run.events if event.before is Mode.CONTACT), run.t[-1])
+        inside = (run.t >= touch) & (run.t <= ends)
+        assert run.lam[inside, 0].max() == pytest.approx(pressed(a0, a1, speed, ends - touch), rel=10.0 * rtol), rtol
+
+
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 def test_a_vibration_that_decays_has_one_peak(rtol):
     """lam = 9.81 + 9 cos 100 t, and less from period to period: only the first peak is the largest of its contact."""

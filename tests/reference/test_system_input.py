@@ -5,12 +5,14 @@ import inspect
 
 import numpy as np
 import pytest
+from friction_scenes import sphere_on_floor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mechanisms import ball, flyby
 
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases.files.case import Given, case_of
+from crossbody.engines.equations import system_of
 from crossbody.reference import Options, System, simulate
 from crossbody.reference.options import Chosen
 from crossbody.reference.systems import ball as ball_kernels
@@ -120,3 +122,20 @@ def test_options_are_named_once_for_editors_and_once_for_runs():
     assert {name: part.__forward_arg__ for name, part in Given.__annotations__.items()} == {
         name: one.annotation for name, one in parameters.items() if name != "scene"
     }
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=7, max_size=7), st.lists(st.floats(-5.0, 5.0), min_size=6, max_size=6))
+@settings(max_examples=30, deadline=None)
+def test_rates_take_arrays_of_any_kind(q: list[float], v: list[float]) -> None:
+    """Read-only ones, as runs have them, others' parts, and whole numbers."""
+    system = system_of(case_of(sphere_on_floor(0.5, 0.1), q0=[0, 0, 1, 1, 0, 0, 0], t_end=1.0))
+    wanted = system.displacement(np.array(q), np.array(v))
+    frozen = [np.array(x) for x in (q, v)]
+    for array in frozen:
+        array.flags.writeable = False
+    parts = [np.stack([x, x], axis=1)[:, 0] for x in (q, v)]
+    for one in (frozen, parts):
+        np.testing.assert_array_equal(system.displacement(*one), wanted)
+        np.testing.assert_array_equal(system.rates(*one), system.rates(np.array(q), np.array(v)))
+    whole = [np.round(x).astype(int) for x in (q, v)]
+    np.testing.assert_array_equal(system.displacement(*whole), system.displacement(*(1.0 * x for x in whole)))

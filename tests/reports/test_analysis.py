@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 
 import numpy as np
@@ -29,6 +30,7 @@ from crossbody.reference.sundials.equations import Equations
 from crossbody.reports.analysis import numbers
 from crossbody.reports.analysis import places as analyse
 from crossbody.reports.analysis.loci import Family, limits
+from crossbody.reports.analysis.summary import over
 
 RNG = np.random.default_rng(27)
 LAW = RowLaw(a0=1e4, a1=50.0)
@@ -341,6 +343,9 @@ def test_where_a_gain_makes_an_equilibrium_unstable():
     poles = family.model(1, float(rows.loc["left finger", "value"])).poles()
     crossing = poles[np.argmin(np.abs(poles - 1j * rows.loc["left finger", "frequency"]))]
     assert abs(crossing.real) < 1e-6 * abs(crossing)
+    told = over("kstar", (500.0, 800.0), rows.reset_index())
+    assert told == "Unstable above kstar = 595.376: left finger, right finger."
+    assert over("kstar", (1.0, 2.0), rows[:0]) == "Nothing gains or loses its stability over kstar = 1 .. 2."
 
 
 def test_the_models_are_read_by_scipy_and_by_python_control():
@@ -365,12 +370,32 @@ def test_every_place_of_a_case_is_an_equilibrium(name, variant):
         assert not place.trim.pulling
 
 
+ROD = Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("limits", "turns", "found"),
+    [((-np.inf, np.inf), 0, (0.0, np.pi)), ((-2.6, 2.6), 0, (0.0,)), ((-np.inf, np.inf), 3, (0.0, np.pi))],
+)
+def test_equilibria_are_looked_for_all_along_a_motion_and_inside_of_its_bounds(limits, turns, found):
+    """Of a rod that falls from near its highest place: upright, if no bound is before, and hanging."""
+    hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0), range=limits, law=LAW)
+    start = 2.5 + 2.0 * np.pi * turns
+    case = cases.from_scene(Scene(bodies=(ROD,), joints=(hinge,)), q0=[start], t_end=3.0)
+    places = [place for place in analyse.places(case) if place.name.startswith("touching nothing")]
+    assert sorted(float(place.trim.q[0]) - 2.0 * np.pi * turns for place in places) == pytest.approx(found, abs=1e-9)
+    assert all(abs(place.trim.q[0] - start) <= np.pi for place in places)
+    rates = {round(float(place.trim.q[0]) / np.pi) % 2: place.model.poles().real.max() for place in places}
+    own = np.sqrt(9.81 * 0.5 / (0.1 + 0.25))
+    assert rates.get(1, own) == pytest.approx(own, rel=1e-9)
+    assert rates[0] == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize(("low", "stands"), [(-0.2, False), (0.3, True)])
 def test_where_a_row_would_have_to_pull_there_is_no_equilibrium(low, stands):
     """A rod that hangs swings against a bound: only one beyond the lowest place holds it."""
-    rod = Body(name="rod", mass=1.0, com=(0.0, 0.0, -0.5), inertia=(0.1, 0.1, 0.01, 0.0, 0.0, 0.0))
     hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0.0, 1.0, 0.0), range=(low, 2.0), law=LAW)
-    case = cases.from_scene(Scene(bodies=(rod,), joints=(hinge,)), q0=[0.8], t_end=2.0)
+    case = cases.from_scene(Scene(bodies=(ROD,), joints=(hinge,)), q0=[0.8], t_end=2.0)
     (touches,) = (place for place in analyse.places(case) if place.name == "touching hinge low")
     assert (touches.model is not None) == stands
     assert touches.why == (
@@ -390,7 +415,13 @@ def test_the_command_writes_tables_and_a_page(tmp_path, capsys):
     assert "on the floor" in capsys.readouterr().out
     rows = json.loads((out / "analysis-locus.json").read_text())["rows"]
     assert {row["branch"] for row in rows} == {0, 1}
-    assert (out / "index.html").is_file()
+    page = (out / "index.html").read_text()
+    assert "Equilibria and linear models of bouncing_ball:linear" in page
+    (told,) = json.loads((out / "analysis-says.json").read_text())["rows"]
+    assert told["says"].startswith(
+        "Nothing gains or loses its stability over a1 = 0 .. 300. bouncing_ball:linear, on the"
+    )
+    assert told["says"] in html.unescape(page)
     with pytest.raises(UnknownName, match="place"):
         command("bouncing_ball", "linear", [], ["x=1"], locus=None, **common)
     with pytest.raises(CaseUnsupported, match="workspace"):

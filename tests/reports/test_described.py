@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -75,6 +76,29 @@ def test_a_model_is_listed_with_its_parameters(name: str) -> None:
     told, model = described.one(name)["Parameters"], models.load(name)
     assert list(told) == list(model.parameters)
     assert all(told[key].startswith(one.doc) and one.unit in told[key] for key, one in model.parameters.items())
+
+
+FILE = """<mujoco><worldbody><geom name="floor" type="plane" size="2 2 .1" friction=".5 0 0"/>
+<body name="a" pos="0 0 .1"><freejoint name="f"/><geom name="ball" type="sphere" size=".1" friction=".5 0 0"/></body>
+<body name="arm" pos="3 0 1"><joint name="h" axis="0 1 0"/>
+<geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/></body>
+</worldbody><actuator><motor name="m" joint="h" ctrlrange="-2 3"/></actuator></mujoco>"""
+
+
+def test_a_file_is_listed_with_every_name_that_its_options_take(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(FILE)
+    told = described.one(str(path))
+    taken = [("start", name) for name in told["Coordinates (--start)"]]
+    taken += [("rate", name) for name in told["Velocities (--rate)"]]
+    places, turns = [f"f {x}" for x in "xyz"], [f"f r{x}" for x in "xyz"]
+    assert [name for _, name in taken] == [*places, "h", *places, *turns, "h"]
+    for option, name in taken:
+        cases.load(str(path), **{option: f"{name} 0.25"})
+    assert list(told["Bodies (--push)"]) == ["a", "arm"]
+    assert told["Actuators (columns of --ctrl)"] == {"m": "[-2, 3]"}
+    rubs = cases.load(str(path), friction=1)
+    assert [*told.get("Rows", ()), *told["Rows if its motion comes to a contact with friction"]] == list(rubs.contacts)
 
 
 def test_an_unknown_case_is_a_sentence() -> None:

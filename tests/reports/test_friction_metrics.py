@@ -20,10 +20,15 @@ from crossbody.cases.scene import Body, Joint
 from crossbody.reference import simulate
 from crossbody.reports import metrics
 from crossbody.reports.judging.controls import unseen
-from crossbody.reports.measuring import friction
+from crossbody.reports.judging.judge_controls import blind
+from crossbody.reports.judging.planted import faults
+from crossbody.reports.judging.verdict import Word
+from crossbody.reports.measuring import friction, slow_slips
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.friction import rubbing
-from crossbody.reports.measuring.truth import Truth, from_run
+from crossbody.reports.measuring.impulse import cumulative
+from crossbody.reports.measuring.slow_slips import firm_until
+from crossbody.reports.measuring.truth import Truth, before, from_run
 from crossbody.reports.metrics import law_residual
 
 NAMES = (
@@ -77,6 +82,9 @@ def test_a_pair_slides_where_any_of_its_places_does(which: int) -> None:
         normal=np.ones((101, 2)), dry=np.zeros(2, dtype=bool),
     )  # fmt: skip
     assert list(friction.changes(run, rubs)) == [(0, 0.2, True), (0, 0.6, False)]
+    mode = np.array(run.mode)
+    mode[20:60, which] = Mode.FREE  # what moves in the air has not slid
+    assert list(friction.changes(replace(run, mode=mode), rubs)) == []
 
 
 def pushed(change: Any) -> Trajectory:
@@ -322,3 +330,105 @@ def test_where_a_slip_stops_friction_may_have_any_direction(name: str) -> None:
     assert (measured(name, replace(own, lam=lam), truth=truth) or 0.0) < 1e-9
     lam[before - 1, 1:] *= -1.0
     assert (measured(name, replace(own, lam=lam), truth=truth) or 0.0) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["complementarity", "cone_violation", "friction_angle", "law_residual"])
+def test_what_contacts_bear_where_a_slip_stops_is_not_looked_at(name: str) -> None:
+    """A sample later or earlier is."""
+    own = engines.load("reference").prepare(CASE, "compiled").run()
+    (stop,) = (event.t for event in own.events if event.after == Mode.STICK)
+    truth, at, normal = from_run(own, Tier.A, "itself"), int(np.searchsorted(own.t, stop)), CASE.law.touches
+    for i, seen in ((at, False), (at - 1, True), (at + 1, name != "friction_angle")):
+        lam = own.lam.copy()
+        lam[i] = np.where(normal, -0.5, -2.0) * (lam[i] if name == "complementarity" or i <= at else lam[at - 1])
+        value = measured(name, replace(own, lam=lam), truth=truth) or 0.0
+        assert (value > 1e-3) == seen, (i - at, value)
+
+
+def released(lam: float, ends: bool) -> Trajectory:
+    """Return a motion whose row bears 1 N, and less from 0.5 s on, and lets go there or not."""
+    t = np.linspace(0.0, 1.0, 101)
+    none, late = np.zeros((101, 1)), (t >= 0.5)[:, None]
+    events = [(0.1, Mode.FREE, Mode.CONTACT), *([(0.5, Mode.CONTACT, Mode.BALLISTIC)] if ends else [])]
+    mode = np.where(late & ends, Mode.BALLISTIC, np.where(t[:, None] < 0.1, Mode.FREE, Mode.CONTACT))
+    return Trajectory(
+        t=t, q=none, v=none, gap=none - 1e-3, lam=np.where(late, 0.0 if ends else lam, 1.0), energy=np.zeros((101, 2)),
+        mode=mode.astype(np.int8), steps=100,
+        events=tuple(Event(t=at, contact=0, before=before, after=after) for at, before, after in events),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("lam", "counts"), [(0.0, 0.0), (0.9e-6, 0.0), (1.1e-6, 1.0), (0.5, 1.0)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_contact_that_bears_less_than_is_known_may_end_or_not(lam: float, counts: float, sign: float) -> None:
+    """In either of the two motions; one that bears more counts."""
+    case = cases.load("bouncing_ball")
+    run, truth = (released(lam, ends) for ends in (sign > 0.0, sign < 0.0))
+    assert measured("release_count", run, case, from_run(truth, Tier.A, "made up")) == sign * counts
+
+
+@pytest.mark.parametrize(("speed", "seen"), [(0.5e-5, True), (2e-5, False)])
+def test_a_hold_at_the_end_of_slides_too_slow_to_be_told_is_none(speed: float, seen: bool) -> None:
+    """A motion that has it is measured by the others; where the truth slides faster it has another order."""
+    own = engines.load("reference").prepare(ball(), "compiled", samples=np.linspace(0.0, 0.5, 501)).run()
+    (stop,) = (e for e in own.events if e.after == Mode.STICK)
+    behind = own.t >= 0.45
+    again = [Event(t=0.4, contact=stop.contact, before=Mode.STICK, after=Mode.SLIP)]
+    ended = [Event(t=0.45, contact=stop.contact, before=Mode.SLIP, after=Mode.STICK)]
+    slides, v = np.array(own.mode), np.array(own.v)
+    slides[(own.t >= 0.4) & (own.mode == Mode.STICK)[:, 0], 0] = Mode.SLIP
+    v[own.t >= 0.4, 0] += 0.1 * SPEED
+    v[behind, 0] = own.v[behind, 0] + speed * SPEED
+    truth = replace(own, v=v, mode=slides, events=(*own.events, *again))
+    held = np.array(slides)
+    held[behind] = own.mode[behind]
+    run = replace(truth, mode=held, events=(*truth.events, *ended))
+    value = measured("stick_times", run, truth=from_run(truth, Tier.A, "made up"))
+    assert (value is not None) == seen
+    assert value is None or value < 1e-12
+
+
+@pytest.mark.parametrize("known", [1e-6, 1e-7, 1e-9])
+@pytest.mark.parametrize("rtol", [1e-9, 1e-11])
+def test_friction_of_slow_slips_is_told_as_far_as_their_direction_is_known(
+    known: float, rtol: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a ball whose slip dies out at a constant rate the integral of mu m g d/s is known."""
+    open_ = 1e-8
+    monkeypatch.setattr(slow_slips, "OPEN", open_)
+    slow, lost = 1e-5 * SPEED, 3.5 * MU * G  # what is slow, and how fast it is lost
+    near = STOP - slow / lost * np.geomspace(1e-8, 1.0, 20001)[::-1]
+    at = np.unique([0.0, near[0] - 1e-12, *near, 0.5])
+    own = engines.load("reference").prepare(CASE, "compiled", rtol=1e-12, samples=at).run()
+    truth, whole = from_run(own, Tier.A, "itself"), float(np.max(np.abs(cumulative(own))))
+    apart = known * rtol / 1e-9
+    run = before(own, near[-1])
+    found = firm_until(truth, replace(run, v=run.v + apart * np.array([0, 1.0, 0, 0, 0, 0])), rtol, CASE)
+    bound = MU * float(own.lam[1, 0])
+    left = open_ * whole / bound * lost / known  # ln of how much slower than what is slow it is then
+    slowest = slow * np.exp(-left)
+    if known == 1e-9:  # until it is none in any direction
+        assert found > STOP - 1e-6 / lost
+    else:
+        assert slowest > 10.0 * known
+        assert found == pytest.approx(STOP - slowest / lost, abs=0.02 * slowest / lost)
+
+
+def test_impulses_are_compared_up_to_where_slips_tell_them() -> None:
+    """A fault before that is seen, one behind it is not."""
+    own = engines.load("reference").prepare(CASE, "compiled", samples=np.linspace(0.0, 0.5, 501)).run()
+    truth = replace(from_run(own, Tier.A, "itself"), firm=0.3)
+    for t, seen in ((0.2, True), (0.35, False)):
+        more = replace(own, lam=np.where((own.t > t)[:, None], 1.01, 1.0) * own.lam)
+        value = measured("lam_impulse_path", more, truth=truth) or 0.0
+        assert (value > 1e-3) == seen
+
+
+@pytest.mark.parametrize(("speed", "turns"), [(SPEED, True), (0.0, False)])
+def test_a_row_says_where_no_friction_can_be_turned(speed: float, turns: bool) -> None:
+    """As of a ball that lies still: else nobody knows that nothing was asked."""
+    case = replace(CASE, v0=np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    run = engines.load("reference").prepare(case, "compiled", samples=np.linspace(0.0, 0.5, 501)).run()
+    rows = [row for row in blind(case, from_run(run, Tier.A, "itself"), "") if row.metric == "friction_angle (control)"]
+    assert [row.verdict for row in rows] == [Word.INFO] * (not turns)
+    assert any("friction_angle" in fault.sees for fault in faults(case, run)) == turns

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -9,9 +11,10 @@ import numpy as np
 import pytest
 
 from crossbody import cases, engines
-from crossbody.cases import Case, EngineUnavailable, Inputs, Outcome
+from crossbody.cases import Case, EngineUnavailable, Inputs, Outcome, Trajectory
 from crossbody.reports.judging import known, known_drives, known_engines
-from crossbody.reports.judging.steps_taken import miscounted
+from crossbody.reports.judging.known_audits import Falls
+from crossbody.reports.judging.steps_taken import miscounted, runaway
 
 
 @pytest.mark.parametrize("name", engines.REGISTRY.own())
@@ -72,3 +75,41 @@ def test_steps_are_counted_against_their_setting() -> None:
     times = np.linspace(0.0, 0.9, 60)
     driven = replace(case, inputs=Inputs(names=("a",), times=times, values=np.zeros((60, 1))))
     assert list(miscounted(driven, {"dt": 0.02}, run)) == []
+
+
+class _Steps(Falls):
+    """A ball that falls by steps of its own, so many times as short as asked for, up to their bound."""
+
+    def run(self) -> Trajectory:
+        shorter, bound = float(self.more), int(self.settings["max_steps"])
+        dt = float(self.settings["dt"]) / shorter
+        count = min(math.ceil(self.case.t_end / dt - 1e-9), bound)
+        one = np.ones((count + 1, 1))
+        return Trajectory(
+            t=dt * np.arange(count + 1), q=one, v=one, gap=one, lam=one, energy=np.ones((count + 1, 2)),
+            mode=np.zeros((count + 1, 1), dtype=np.int8), steps=count,
+            outcome=Outcome.STEP_LIMIT if count == bound else Outcome.FINISHED,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_engine_that_takes_tiny_steps_is_told_before_it_takes_all_of_them(seed: int) -> None:
+    draw, case = np.random.default_rng(seed), cases.load("bouncing_ball", "linear")
+    for shorter, told in ((1.0, False), (2.0, False), (float(10.0 ** draw.uniform(2.5, 7.0)), True)):
+        runs: list[_Steps] = []
+
+        def prepare(
+            first: cases.Case, more: Mapping[str, Any], by: float = shorter, made: list[_Steps] = runs
+        ) -> _Steps:
+            made.append(_Steps(case=first, settings=more, more=by, late=False))
+            return made[-1]
+
+        why = runaway(case, {"dt": case.t_end * 10.0 ** draw.uniform(-5.0, -2.0), "max_steps": 2_000_000}, prepare)
+        assert bool(why) == told, (shorter, why)
+        assert all(run.run().steps <= 1000 for run in runs)
+
+
+def test_settings_that_leave_nothing_to_look_at_ask_for_nothing() -> None:
+    case = cases.load("bouncing_ball", "linear")
+    for settings in ({}, {"dt": 0.001}, {"dt": case.t_end, "max_steps": 9}):
+        assert runaway(case, settings, lambda *_: pytest.fail("asked")) == ""

@@ -757,3 +757,12 @@ def test_a_run_far_beyond_a_limit_that_is_not_judged_is_seen_to_be(tmp_path: Pat
     )
     assert '<tr data-verdict="not judged" data-beyond' in page
     assert '▲</span> <span class="said">beyond, not judged' in page
+
+
+def test_a_report_says_of_every_folder_what_is_wrong_with_it(tmp_path: Path) -> None:
+    gone, empty = tmp_path / "gone", tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(OutputError) as told:
+        site.write(gone, others=[empty])
+    assert str(gone) in str(told.value)
+    assert str(empty) in str(told.value)

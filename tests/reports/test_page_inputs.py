@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 from unpacked import numbers
 
+from crossbody import engines
 from crossbody.cases import Inputs, load
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring.controlled import acting
+from crossbody.reports.measuring.cubics import coordinates
 from crossbody.reports.pages import figures
 from crossbody.reports.runs import study
 
@@ -45,3 +48,30 @@ def test_of_many_those_are_drawn_that_change_most() -> None:
     tops = [numbers(line["y"]).max() for line in figure["data"]]
     assert tops == list(sizes[-len(tops) :])
     assert f"({len(tops)} of 40, those that change most)" in figure["layout"]["title"]["text"]
+
+
+MOTORS = [0, 3, 6]
+
+
+@pytest.mark.parametrize("variant", ["circle", "pd"])
+def test_a_controller_among_the_equations_is_drawn_by_what_it_gave(variant: str) -> None:
+    """Constant torques between ticks do the work that the run's own account has of its inputs."""
+    case = load("delta_tracking", variant, t_end=0.2)
+    run = engines.load("reference").prepare(case, "compiled", ledger=True).run()
+    found = acting(case, run)
+    assert found is not None
+    assert found.names == ("torque 1 [N m]", "torque 2 [N m]", "torque 3 [N m]")
+    turns = np.diff(coordinates(run, found.times)[:, MOTORS], axis=0)
+    work = np.cumsum(np.sum(found.values[:-1] * turns, axis=1))
+    assert run.ledger is not None
+    given = np.interp(found.times[1:], run.t, run.ledger.input)
+    assert np.abs(given).max() > 1e-5, "J"
+    np.testing.assert_allclose(work, given, atol=1e-5 * np.abs(given).max())
+
+
+def test_a_page_says_that_a_controller_was_asked_again() -> None:
+    case = load("delta_tracking", "circle", t_end=0.05)
+    result = SimpleNamespace(case=case, truth=truth_of(case), entries=())
+    traces = study.traces(result)
+    assert len(figures.inputs(traces)["data"]) == 3
+    assert "computed again" in figures.note("inputs", traces)

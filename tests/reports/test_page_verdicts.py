@@ -15,11 +15,13 @@ import pytest
 from study_pages import page_of
 
 from crossbody.cases import load
+from crossbody.reports import metrics
+from crossbody.reports.figures.section import Section, Table, columns
 from crossbody.reports.judging.told import beyond, runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Word
-from crossbody.reports.pages import case_page
-from crossbody.reports.pages.html import BEYOND
+from crossbody.reports.pages import case_page, grid
+from crossbody.reports.pages.html import BEYOND, Page, render
 
 needs_chromium = pytest.mark.skipif(
     chromium.binary() is None, reason="Chromium is not installed (Debian: apt-get install chromium)."
@@ -143,3 +145,54 @@ def test_the_picture_is_on_the_first_screen(page: Path, browser: chromium.Browse
     bottom = browser.js("document.querySelector('.player canvas').getBoundingClientRect().bottom")
     assert bottom <= height
     assert browser.js("document.querySelector('[data-play]').getBoundingClientRect().bottom") <= height
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_columns_begin_with_the_engines_that_are_off(seed: int) -> None:
+    rows = [row | {"engine": row["who"].partition(":")[0]} for row in drawn(seed)]
+    rows = [row for row in rows if row["verdict"] in (*OFF, "within", "skipped")]
+    shown = grid.ran(rows)
+    worst = [min(map(RANK.index, {row["verdict"] for row in rows if row["who"] == who} - {"skipped"})) for who in shown]
+    assert worst == sorted(worst)
+    assert set(shown) == {row["who"] for row in rows if row["verdict"] != "skipped"}
+
+
+def test_profiles_of_an_engine_stay_side_by_side_behind_the_truth_is_nothing() -> None:
+    words = {
+        "a:good": "within",
+        "b:bad": "outside",
+        "a:odd": "expected-outside",
+        "b:good": "within",
+        "truth:": "within",
+    }
+    rows = [{"who": who, "verdict": word, "limit": 1.0, "value": 0.5, "expected": None} for who, word in words.items()]
+    assert grid.ran(rows) == ["b:bad", "b:good", "a:odd", "a:good", "truth:"]
+
+
+RANK = ("crashed", "outside", "expected-outside", "within")
+
+
+def test_every_metric_at_a_glance_says_what_it_measures(page: Path) -> None:
+    text = unescape(page.read_text())
+    assert f'title="{metrics.summary("law_residual")}"' in text
+    assert f'title="{metrics.summary("position")}"' in text
+
+
+def test_a_table_without_rows_is_a_word_and_no_heads() -> None:
+    table = Table(title="Leads", columns=columns(a="Alone"), rows=[])
+    text = render([Page(name="p", title="t", sections=[Section(name="s", title="S", tables=(table,))])], [], "")
+    assert "There is none." in text
+    assert "Alone" not in text
+
+
+@pytest.mark.browser
+@needs_chromium
+def test_a_telephone_shows_how_many_times_its_limit_a_number_is_and_each_reason_whole(
+    page: Path, browser: chromium.Browser
+) -> None:
+    browser.open(page, width=400)
+    row = "document.querySelector('.verdicts tbody tr:not([hidden])')"
+    assert browser.js(f"{row}.cells[7].getBoundingClientRect().right") <= 400
+    summary = f"{row}.querySelector('.why summary')"
+    assert browser.js(f"{summary}.scrollHeight <= {summary}.clientHeight + 1")
+    assert browser.js(f"getComputedStyle({summary}).webkitLineClamp") == "none"

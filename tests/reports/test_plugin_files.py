@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -152,3 +153,12 @@ def test_python_is_told_as_the_command_is(here: Path) -> None:
         installed.use(["absent.py"])
     with pytest.raises(InvalidValue, match="plug-in is 3"):
         installed.use([3])  # type: ignore[list-item]
+
+
+def test_nothing_is_left_beside_a_file_of_the_users_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    file = tmp_path / "beside.py"
+    file.write_text("A = 1\n")
+    assert installed.from_file("plugin", file).A == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["beside.py"]
+    assert not sys.dont_write_bytecode

@@ -342,3 +342,9 @@ def test_a_worker_killed_in_a_cluster_loses_no_result(cluster: Any, tmp_path: Pa
     here, there = (stores[name].table()[0] for name in ("here", "there"))
     assert len(there) == len(specs)
     pd.testing.assert_frame_equal(here, there, check_exact=True)
+
+
+def test_the_time_of_a_run_is_the_suites_own_or_what_is_asked_for() -> None:
+    ask = Ask(names=("damping",), runs=3, wanted=("reference:compiled",))
+    assert {spec.time_limit for spec in plan(replace(ask, limit=7.5))} == {7.5}
+    assert 7.5 not in {spec.time_limit for spec in plan(ask)}

@@ -91,7 +91,9 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
     assert not deviating or deviating[1] in ("The run", str(len(by["expected"])))
     if most := max(by["expected"], key=times.__getitem__, default=None):
         size = f"position {times[most] * 1e-3:.2g}, {times[most]:.2g} times its limit"
-        assert f"The largest deviation of position: {most} on ball:hard ({size}): Soft contacts. " in f"{text} "
+        assert (
+            f"The largest deviation of position: {most} on ball:hard ({size}): Soft contacts, of a step. " in f"{text} "
+        )
     for kind, begin in (("outside", "Off:"), ("unbounded", "Beyond a limit for a known cause, and not judged:")):
         farthest = sorted(by[kind], key=lambda who: -times[who])
         assert named(text, begin) == (farthest[:NAMED], max(len(farthest) - NAMED, 0))
@@ -163,7 +165,7 @@ def test_the_sentence_says_of_what_the_largest_deviation_is_and_relative_to_what
     ]
     text = sentence(runs_of(rows))
     assert "The largest deviation of position: one:p on ball:hard (position x by 0.0084 m at 1 s, 34 times" in text
-    assert "34 times its limit): Soft contacts." in text
+    assert "34 times its limit): Soft contacts, of a step." in text
     assert "Off: two:p on ball:hard (event_times 0.5 s, 5e+02 times its limit)" in text
 
 

@@ -111,7 +111,7 @@ def _size(said: str) -> float:
 
 
 def test_how_far_a_start_is_off_is_over_the_largest_of_its_own_unit() -> None:
-    named, motion = (Coordinate("x", "m"), Coordinate("turn", "rad")), np.array([[1.0, 1000.0]])
+    named, motion = (Coordinate(name="x", unit="m"), Coordinate(name="turn", unit="rad")), np.array([[1.0, 1000.0]])
     found = _motions._apart(np.array([1e-3, 0.0]), motion, named, False)
     assert found == pytest.approx(1e-3)
     assert found.where == "x by 0.001 m at 0 s"

@@ -317,7 +317,8 @@
       const each = (track) => track.happens[0].map((t, i) => ({ t, who: track.name, what: track.happens[1][i] }));
       const found = shown.filter((track) => track === lead).flatMap(each).map((one) => ({ t: one.t, all: [one] }));
       const rest = shown.filter((track) => track !== lead).flatMap(each).sort((a, b) => a.t - b.t).filter((one) => {
-        const near = found.find(({ t }) => Math.abs(t - one.t) <= 0.5 * scene.frame);
+        const far = ({ t, all }) => Math.abs(t - one.t) + (all[0].what === one.what ? 0 : scene.frame); // its like first
+        const near = found.filter(({ t }) => Math.abs(t - one.t) <= 0.5 * scene.frame).sort((a, b) => far(a) - far(b))[0];
         near?.all.push(one);
         return !near;
       });
