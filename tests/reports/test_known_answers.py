@@ -18,7 +18,6 @@ from crossbody.reports.judging import (
     judge_controls,
     known,
     known_arithmetic,
-    known_files,
     known_growth,
     known_parts,
     known_samples,
