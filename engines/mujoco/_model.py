@@ -17,7 +17,7 @@ from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.files import mjcf
 from crossbody.cases.files.without import strip
-from crossbody.cases.scene import UNBOUNDED, Scene
+from crossbody.cases.scene import UNBOUNDED, Scene, Tendon
 from crossbody.cases.scene_contacts import frictional, rough, rows_of, under_law
 from crossbody.engines._acting import Acting
 from crossbody.engines._acting import acting as acting_of
@@ -40,6 +40,9 @@ SLOWEST, OF_RATE, OF_ROWS = 1e-3, 0.02, 0.05
 """Largest step of the matched profile, s, and the parts that it is of the fastest time constant
 of forces and of that of rows that open: Runge-Kutta 4 leaves (1/50)^4 a time constant, and rows
 act for a few of theirs."""
+OF_KINKS = 0.002
+"""The part of the fastest time constant of forces that a step is where these have bounds, or springs
+dead bands: whatever the order, a step across a kink leaves up to (h rate)^2/4 of what moves, 1e-6."""
 STABLE, DECAYS = 0.5, 0.5
 """Largest product of the step and any rate, where Runge-Kutta 4 is stable up to 2.8 and rates
 change as bodies turn; and part of a rate by which a mode may swing at most that only decays."""
@@ -127,7 +130,8 @@ def default_step(case: Case, profile: str) -> float:
     stiffness = law.a0 + 3.0 * law.a2 * deep**2
     poles = [np.roots([1.0, a1, k]) for k, a1 in zip(stiffness[opening], law.a1[opening], strict=True)]
     rate = float(np.abs(np.concatenate([np.zeros(1), *poles])).max())
-    return min(SLOWEST, OF_RATE / fastest(scene, case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
+    part = OF_KINKS if smooth(scene) != scene else OF_RATE
+    return min(SLOWEST, part / fastest(scene, case.q0, case.v0), OF_ROWS / max(rate, OF_ROWS))
 
 
 def followed(case: Case, profile: str) -> Case | None:
@@ -165,11 +169,24 @@ def fastest(scene: Scene, q: Floats, v: Floats) -> float:
     return max(float(np.max(size * np.maximum(counts, OF_RATE / STABLE), initial=0.0)), *filters, 1.0)
 
 
+def smooth(scene: Scene) -> Scene:
+    """Return the scene without bounds of forces and dead bands: where they hold, they hide how fast forces change."""
+
+    def banded(tendon: Tendon) -> Tendon:
+        return replace(tendon, rest=tendon.rest[:1] * 2) if any(tendon.stiffness) else tendon
+
+    return scene.replace(
+        actuators=tuple(replace(one, force_range=UNBOUNDED) for one in scene.actuators),
+        joints=tuple(replace(one, force_range=UNBOUNDED) for one in scene.joints),
+        tendons=tuple(banded(one) for one in scene.tendons),
+    )
+
+
 def _slopes(scene: Scene, q: Floats, v: Floats) -> Floats:
     """Return d(v, v')/d(q, v) (2 nv, 2 nv) by springs, dampers and actuators alone, with the loops closed."""
     from scipy.linalg import null_space  # as above
 
-    model = matched(scene)
+    model = matched(smooth(scene))
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = q, v
     mujoco.mj_forward(model, data)

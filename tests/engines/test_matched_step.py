@@ -7,7 +7,7 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Case, Outcome
-from crossbody.cases.scene import Body, Joint, Loop, RowLaw, Scene
+from crossbody.cases.scene import Actuator, Body, Joint, Loop, RowLaw, Scene, Tendon
 from crossbody.engines.mujoco import _model
 
 
@@ -50,6 +50,25 @@ def test_what_only_decays_is_followed_as_far_as_it_moves(seed: int, rate: float)
     exact = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
     assert moved.outcome is exact.outcome is Outcome.FINISHED
     assert np.abs(moved.q[-1] - exact.q[-1]).max() <= 1e-7
+
+
+@pytest.mark.parametrize("kind", ["servo", "band"])
+@pytest.mark.parametrize("seed", range(3))
+def test_forces_with_bounds_and_springs_with_dead_bands_are_within_limits(seed: int, kind: str) -> None:
+    """Wherever they are at the start: held at a bound, or slack, they tell nothing of how fast they change."""
+    rng = np.random.default_rng(seed)
+    body = Body(name="wheel", mass=1.0, inertia=(0.05, 0.05, 0.05, 0.0, 0.0, 0.0))
+    stiff, most = float(rng.uniform(10.0, 40.0)), float(rng.uniform(1.0, 3.0))
+    joint = Joint(name="turn", body="wheel", type="hinge", axis=(0.0, 1.0, 0.0))
+    servo = Actuator(name="servo", joint="turn", bias=(0.0, -stiff, -0.05 * stiff), force_range=(-most, most))
+    rope = Tendon(name="rope", joints=("turn",), coefficients=(1.0,), stiffness=(stiff, 0.0, 0.0), rest=(-0.3, 0.2))
+    own = {"actuators": (servo,)} if kind == "servo" else {"tendons": (rope,)}
+    start = 1.0 if kind == "servo" else 0.0
+    case = cases.from_scene(Scene(bodies=(body,), joints=(joint,), **own), q0=[start], v0=[2.0], t_end=1.0)
+    run = engines.load("mujoco").prepare(case, "matched").run()
+    exact = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
+    assert np.abs(run.q[-1] - exact.q[-1]).max() <= 1e-6 * np.abs(exact.q).max()
+    assert np.abs(run.v[-1] - exact.v[-1]).max() <= 1e-5 * np.abs(exact.v).max()
 
 
 @pytest.mark.parametrize("seed", range(12))
