@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.planting import Range
 
 Row = TypeVar("Row")
 Found = tuple[str, float, Range, str]

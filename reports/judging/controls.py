@@ -18,7 +18,8 @@ from crossbody.cases.between import between
 from crossbody.engines.contract import QUANTITIES
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import answered_once, audit, rounded, states
-from crossbody.reports.judging.planted import Range, faults
+from crossbody.reports.judging.planted import faults
+from crossbody.reports.judging.planting import Range
 from crossbody.reports.judging.truth import agreement
 from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.truth import Truth, taken

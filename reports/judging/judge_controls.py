@@ -33,7 +33,8 @@ def blind(case: Case, truth: Truth, command: str, ran: Iterable[str] = ()) -> It
     """Say which metric, or the audit, does not see a fault that was put into what it looks at, or lets it pass."""
     from crossbody.reports.judging import known
     from crossbody.reports.judging.controls import unheard, unseen  # with numba, which pages do without
-    from crossbody.reports.judging.planted import PART, unturned
+    from crossbody.reports.judging.planted_friction import unturned
+    from crossbody.reports.judging.planting import PART
 
     near = Judge(case, JUDGED, truth, command)
     far = Judge(case, JUDGED, replace(truth, grows=FAR), command)

@@ -17,7 +17,7 @@ from crossbody.cases import Case, Event, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports import metrics
 from crossbody.reports.judging.made_up import MadeUp, case_of
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.planting import Range
 from crossbody.reports.measuring.truth import Truth
 
 EXACT = 1e-9

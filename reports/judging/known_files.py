@@ -22,7 +22,7 @@ from crossbody import cases
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.reports.judging.asked import Found, rows_of
-from crossbody.reports.judging.planted import Range
+from crossbody.reports.judging.planting import Range
 from crossbody.reports.judging.start_of_file import start_of_file
 
 EXACT = 1e-9
