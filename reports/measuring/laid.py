@@ -58,9 +58,12 @@ class Laid:
 
 
 def straight(t: Floats, here: Floats, there: Floats) -> Floats:
-    """Return the clock (n,) that shows `there` (k,) at a run's instants `here` (k,), and goes as time does behind."""
-    shown: Floats = np.interp(t, here, there) + np.maximum(t - here[-1], 0.0)
-    return shown
+    """Return the clock (n,) that shows `there` (k,) at a run's instants `here` (k,), and goes as time does behind.
+
+    Where both are the same it shows t itself: a rounding more, and the last sample would be behind the truth's end.
+    """
+    shown = np.interp(t, here, there) + np.maximum(t - here[-1], 0.0)
+    return np.where(np.interp(t, here, there - here) == 0.0, t, shown)
 
 
 def nearest(truth: Truth, run: Trajectory, case: Case, here: Floats, there: Floats) -> Laid:

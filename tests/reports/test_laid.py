@@ -15,7 +15,7 @@ from crossbody.reports import metrics
 from crossbody.reports.judging.made_up import case_of
 from crossbody.reports.judging.parts import Positions
 from crossbody.reports.measuring.alignment import clock, which_laid
-from crossbody.reports.measuring.laid import APART, TOLD, Laid, _least, _path
+from crossbody.reports.measuring.laid import APART, TOLD, Laid, _least, _path, straight
 from crossbody.reports.measuring.scale import scale_of, scale_of_rates
 from crossbody.reports.measuring.truth import Truth, from_run
 
@@ -205,3 +205,14 @@ def test_a_body_that_starts_a_hair_above_a_plane_is_off_by_what_it_is_at_equal_t
         assert found is not None
         assert off - 1e-4 <= found <= at_equal_times("position", truth, run, case) * (1.0 + 1e-6)
         assert off <= known
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_a_clock_that_is_laid_on_the_same_instants_shows_them_without_a_rounding(seed: int) -> None:
+    """Else the last sample of a run was behind the end of its truth, and nobody looked at it."""
+    rng = np.random.default_rng(seed)
+    knots, t = np.sort(rng.uniform(0.0, 3.0, (2, 40)), axis=1)
+    knots = np.append(0.0, knots)
+    np.testing.assert_array_equal(straight(t, knots, knots), t)
+    late = knots + np.append(0.0, rng.uniform(0.0, 1e-3, 40))
+    np.testing.assert_array_equal(straight(knots, knots, late), late)
