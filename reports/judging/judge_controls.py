@@ -191,10 +191,14 @@ def _unruled(case: Case) -> Iterator[Blind]:
 
 
 def _grown(judge_: Judge, name: str, value: float) -> bool:
-    """Whether a fault in time is no larger than what errors of the tolerance that limits are for grow to here."""
+    """Whether a fault in time is no larger than what errors of the tolerance that limits are for grow to here.
+
+    What a step adds to a speed goes on as long as the motion does: over a longer horizon than the case's own there are
+    more steps, and more time behind each.
+    """
     limit = limit_for(judge_.limits, name, JUDGED.engine, JUDGED.profile)
     widest = WIDEST * min(judge_.case.t_end, 1.0)
-    return name in TIMES and limit is not None and value <= min(limit.value * judge_.truth.grows, widest)
+    return name in TIMES and limit is not None and value <= min(limit.value * judge_.truth.grows * judge_.longer**2, widest)
 
 
 def _lets_pass(case: Case, name: str, value: float) -> bool:

@@ -277,3 +277,14 @@ def test_modes_that_gaps_and_forces_contradict_are_counted(name: str, variant: s
     for one, other in ((Mode.CONTACT, Mode.FREE), (Mode.SLIP, Mode.STICK)):
         swapped[truth.trajectory.mode == one] = other
     assert measure(truth, replace(truth.trajectory, mode=swapped), case) > 0.0
+
+
+LONGER = [("unequal", 0.3), *(pytest.param("unequal", zeta, marks=pytest.mark.slow) for zeta in (0.1, 0.7))]
+
+
+@pytest.mark.parametrize(("variant", "zeta"), LONGER)
+def test_no_control_is_blind_over_a_horizon_that_a_parameter_has_made_longer(variant: str, zeta: float) -> None:
+    """A coordinate was off at the last sample, which nobody looked at; and limits grow with the horizon."""
+    case = cases.load("newtons_cradle", variant, zeta=zeta)
+    told = [(row.metric, row.why) for row in judge_controls.blind(case, shortened(truth_of(case)), "")]
+    assert not [one for one in told if "control" in one[0]], told
