@@ -100,7 +100,8 @@ def observable(model: LinearModel, tolerance: float = RANK) -> int:
 def _scales(A: Floats) -> Floats:
     from scipy.linalg import matrix_balance
 
-    _, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    with np.errstate(invalid="ignore"):  # of a permutation that is not asked for, and that it reads all the same
+        _, (scale, _) = matrix_balance(A, permute=False, separate=True)
     return np.asarray(scale, dtype=np.float64)
 
 

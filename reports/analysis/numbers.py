@@ -61,10 +61,12 @@ def poles(found: Sequence[Place]) -> pd.DataFrame:
             continue
         m = modes(place.model)
         real, imag = _parts(m.poles)
+        size = np.hypot(real, imag)
         for k in range(len(m.poles)):
             rows.append(
-                {"place": place.name, "real": real[k], "imag": imag[k], "frequency": float(m.frequency[k]),
-                 "damping": float(m.damping[k]), "led_by": m.states[_leader(m.participation[:, k])]}
+                {"place": place.name, "real": real[k], "imag": imag[k], "frequency": float(size[k]),
+                 "damping": -float(real[k] / size[k]) if size[k] else np.nan,
+                 "led_by": m.states[_leader(m.participation[:, k])]}
             )  # fmt: skip
     return pd.DataFrame(rows, columns=list(POLES))
 
@@ -85,9 +87,10 @@ def ranks(found: Sequence[Place]) -> pd.DataFrame:
     for place in found:
         if place.model is None:
             continue
+        real, _ = _parts(place.model.poles())
         rows.append(
             {"place": place.name, "states": len(place.model.states), "controllable": controllable(place.model),
-             "observable": observable(place.model), "growth": float(place.model.poles().real.max(initial=-np.inf))}
+             "observable": observable(place.model), "growth": float(real.max(initial=-np.inf))}
         )  # fmt: skip
     return pd.DataFrame(rows, columns=list(RANKS))
 

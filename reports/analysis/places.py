@@ -30,6 +30,8 @@ TRIED = 8
 """Samples of a run beside which equilibria are looked for in each set of rows."""
 DEEP, SAME, ALIKE = 1e-9, 1e-9, 1e-6
 """Depth that rounding leaves of a bound; change of a position, and of poles over the largest, that is none."""
+MOVING = ", moving"
+"""Behind the name of what is no equilibrium: an instant of a motion."""
 ON = (Mode.CONTACT, Mode.COLLISION, Mode.BILATERAL, Mode.STICK, Mode.SLIP)
 
 
@@ -224,7 +226,7 @@ def _visited(case: Case, at: Mapping[str, float]) -> list[Place]:
         slowest = [slips[j : j + system.tangents[i]].max() for i, slides in rows if slides for j in [system.tangent[i]]]
         sets.setdefault(rows, []).append((float(-min(slowest) if slowest else np.abs(v).max()), k))
     found = [place for rows, seen in sets.items() for place in _seen(case, system, run, seen, dict(rows))]
-    return sorted(found, key=lambda place: place.model is None)
+    return sorted(found, key=lambda place: (place.model is None, place.name.endswith(MOVING)))
 
 
 def _seen(
@@ -318,7 +320,7 @@ def _passed(
         residual=np.nan, outcome=Outcome.ILL_POSED if why else Outcome.FINISHED, pulling=(),
     )  # fmt: skip
     return Place(
-        name=f"{name}, moving", case=case, system=system, trim=passed, model=model, t=t,
+        name=f"{name}{MOVING}", case=case, system=system, trim=passed, model=model, t=t,
         held=False, powered=True, why=why,
     )  # fmt: skip
 

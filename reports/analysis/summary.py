@@ -12,7 +12,7 @@ from crossbody import engines
 from crossbody.cases import Case, CrossbodyError
 from crossbody.reports.analysis import numbers
 from crossbody.reports.analysis.loci import AT_REST
-from crossbody.reports.analysis.places import Place
+from crossbody.reports.analysis.places import MOVING, Place
 from crossbody.reports.analysis.steps import largest_step
 
 Told = Mapping[Any, Any]
@@ -71,8 +71,11 @@ def sentence(label: str, rows: pd.DataFrame, places: int) -> str:
     told: Sequence[Told] = rows.to_dict(orient="records")
     if not told:
         return f"{label}: none of {places} operating points has a linear model."
-    more = f" {places - len(told)} more have none." if places > len(told) else ""
-    return f"{_verdict(label, told)} {_modes(told)}{_steps(told)}{more}"
+    more = f" {places - len(told)} more without a model." if places > len(told) else ""
+    rests = [row for row in told if not row["place"].endswith(MOVING)] or told
+    if (moving := len(told) - len(rests)) > 0:
+        more = f" {moving} more {'is an instant' if moving == 1 else 'are instants'} of the motion.{more}"
+    return f"{_verdict(label, rests)} {_modes(rests)}{_steps(rests)}{more}"
 
 
 def over(parameter: str, ends: tuple[float, float], limits: pd.DataFrame) -> str:

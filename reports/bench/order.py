@@ -16,6 +16,8 @@ NEAR = 10.0
 SLACK = 0.5
 """How far below its promise an order may be seen: events at random places in a step scatter the errors."""
 CONVERGES = 0.5
+STAYS, LAST = 0.8, 3
+"""Part of the largest of the last errors before the finest by which that is at least smaller where a run converges."""
 COLUMNS = ["case", "engine", "profile", "knob", "order", "promised", "says"]
 
 
@@ -48,9 +50,25 @@ def orders(rows: pd.DataFrame) -> pd.DataFrame:
         best = order if math.isnan(early) else max(order, early)
         found.append(
             {"case": case, "engine": engine, "profile": profile, "knob": knob, "order": best, "promised": promised,
-             "says": "exact at every setting" if all(x <= EXACT for x in errors) else says(best, promised)}
+             "says": "exact at every setting" if all(x <= EXACT for x in errors)
+             else stays(str(knob), settings, errors, _known(group)) or says(best, promised)}
         )  # fmt: skip
     return pd.DataFrame(found, columns=COLUMNS)
+
+
+def stays(knob: str, settings: Sequence[float], errors: Sequence[float], known: float) -> str:
+    """Say where errors that are no rounding, nor what the truth is known to, do not fall any further; else nothing."""
+    pairs = sorted(((x, y) for x, y in zip(settings, errors, strict=True) if math.isfinite(y)), reverse=True)
+    finest = [y for _, y in pairs][-LAST - 1 :]
+    if len(finest) <= LAST or finest[-1] <= NEAR * max(FLOOR, known) or finest[-1] <= STAYS * max(finest[:-1]):
+        return ""
+    if max(y for _, y in pairs) > NEAR * finest[-1]:  # an order, above a floor of its own
+        return ""
+    return f"does not converge to the truth of the case: its error does not fall below {knob} = {pairs[-LAST][0]:g}"
+
+
+def _known(rows: pd.DataFrame) -> float:
+    return float(rows["known_to"].max()) if "known_to" in rows else 0.0
 
 
 def says(order: float, promised: float) -> str:

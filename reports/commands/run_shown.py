@@ -22,7 +22,7 @@ from crossbody.reports.runs.choice import DEFAULT_ENGINES
 MANY = 4  # cases that are named of those that an engine could not run
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
-RELATIVE = "Errors of position and their parts are relative: to the largest coordinate of a kind in the motion."
+RELATIVE = "Errors of position and their parts are relative to how far each coordinate moves, turns to a radian."
 COUNTED: dict[str, Callable[[Row], bool]] = {
     "within": lambda row: row["verdict"] == Word.WITHIN,
     "known": lambda row: row["verdict"] == Word.EXPECTED,

@@ -197,8 +197,9 @@ def _grown(judge_: Judge, name: str, value: float) -> bool:
     more steps, and more time behind each.
     """
     limit = limit_for(judge_.limits, name, JUDGED.engine, JUDGED.profile)
+    grown = judge_.truth.grows * judge_.longer**2
     widest = WIDEST * min(judge_.case.t_end, 1.0)
-    return name in TIMES and limit is not None and value <= min(limit.value * judge_.truth.grows * judge_.longer**2, widest)
+    return name in TIMES and limit is not None and value <= min(limit.value * grown, widest)
 
 
 def _lets_pass(case: Case, name: str, value: float) -> bool:

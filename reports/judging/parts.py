@@ -36,6 +36,8 @@ from crossbody.reports.measuring.scale import scale_of
 from crossbody.reports.measuring.truth import Truth, taken
 
 PARTS = ("importer", "model", "step")
+LARGEST = "largest"
+"""Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 SPLIT = ("position", "event_times")  # metrics whose error is split
 RATIO = 2.0  # of one step of a study to the next
 FLAT = 1e-10  # differences of runs below it, relative, are rounding that has added up: they show no order
@@ -197,9 +199,10 @@ def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, S
     unlike = float(np.linalg.norm(first - ratio * second) / max(float(np.linalg.norm(first)), tiny))
     if ratio >= LEAST_RATIO and unlike <= UNLIKE:
         return ratio, sizes[k : k + 3]
+    falls = f"fall {ratio:.2g} times" if ratio > 1.0 else "do not fall"
     raise NotMeasuredError(
         f"No order between steps of {_listed(sizes[k : k + 3])} s, so nothing is extrapolated: "
-        f"the differences fall {ratio:.2g} times from one pair to the next, and {unlike:.0%} "
+        f"the differences {falls} from one pair to the next, and {unlike:.0%} "
         "of them is not a power of the step."
     )
 

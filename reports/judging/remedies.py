@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from crossbody.reports.judging.parts import PARTS, part_of
+from crossbody.reports.judging.parts import LARGEST, PARTS, part_of
 from crossbody.reports.judging.verdict import Row
 
 NOTICED = 1e-3
@@ -21,26 +21,37 @@ DOES = {
 """What makes each part smaller, but for the step, whose setting depends on the run."""
 
 
-def remedy(who: str, rows: Sequence[Row], metric: str) -> str:
+def remedy(who: str, rows: Sequence[Row], metric: str, label: str) -> str:
     """Say which part of a run's error is how large, and what makes it smaller; nothing where no step is known.
 
     Args:
         who: engine:profile.
         rows: of that run.
         metric: of which error.
+        label: of the case.
     """
     own = {row["metric"]: row for row in rows}
     step = _shorter(who, own[metric]) if metric in own else ""
     parts = {part: own[name] for part in PARTS if (name := part_of(metric, part)) in own}
     if not parts or not step:
         return ""
-    shares = {part: abs(_number(row["value"]) / own[metric]["value"]) for part, row in parts.items()}
+    shares = {part: _number(row["value"]) / abs(own[metric]["value"]) for part, row in parts.items()}
     if not all(map(math.isfinite, shares.values())):
         test = f"if {step} makes it smaller, it is the step's"
-        return f"What is model and what step in the error of {metric} of {who} is not known: {test}."
-    most = max(shares, key=lambda part: shares[part])
-    does = DOES.get(most, f"{step} makes it smaller")
-    return f"Parts of the error of {metric} of {who}: {', '.join(_told(parts, shares, own[metric]))}; {does}."
+        return f"What is model and what step in the error of {metric} of {who} on {label} is not known: {test}."
+    most = max(shares, key=lambda part: abs(shares[part]))
+    does = DOES.get(most, f"{step} makes it smaller{_at_best(own, metric)}")
+    told = ", ".join(_told(parts, shares, own[metric]))
+    return f"Parts of the error of {metric} of {who} on {label}: {told}; {does}."
+
+
+def _at_best(own: Mapping[str, Row], metric: str) -> str:
+    """Say below what no step brings an error whose largest is the step's: its model alone is off somewhere, too."""
+    row = own.get(f"{LARGEST} {part_of(metric, 'model')}")
+    least = math.nan if row is None else abs(_number(row["value"]))
+    if row is None or not least > _number(row.get("known")):
+        return ""
+    return f", to {least:.2g} at best, which the model alone is off elsewhere"
 
 
 def _number(value: float | None) -> float:
@@ -55,11 +66,11 @@ def _shorter(who: str, row: Row) -> str:
 
 
 def _told(parts: Mapping[str, Row], shares: Mapping[str, float], whole: Row) -> list[str]:
-    """Return each part in per cent, the largest first; those that nobody would notice are left out."""
+    """Return each part in per cent, with its sign, the largest first; those that nobody would notice are left out."""
     told = []
-    for part in sorted(parts, key=lambda part: -shares[part]):
+    for part in sorted(parts, key=lambda part: -abs(shares[part])):
         known = _number(parts[part].get("known")) / abs(whole["value"])
-        size, below = (known, "below ") if shares[part] < known else (shares[part], "")
-        if size >= NOTICED:
+        size, below = (known, "below ") if abs(shares[part]) < known else (shares[part], "")
+        if abs(size) >= NOTICED:
             told.append(f"{part} {below}{100.0 * size:.3g} %")
     return told

@@ -19,7 +19,7 @@ from crossbody.cases.defaults import TOLERANCE, limits_of
 from crossbody.reports import metrics
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.clocks import Clock, mistimed
-from crossbody.reports.judging.parts import PARTS, SPLIT, Split, Study, part_of, splits
+from crossbody.reports.judging.parts import LARGEST, PARTS, SPLIT, Split, Study, part_of, splits
 from crossbody.reports.judging.steps_taken import miscounted
 from crossbody.reports.judging.stored import (
     Deviations,
@@ -68,8 +68,6 @@ TINY = 1e-300
 """In place of a tolerance of an audit that is zero: any difference is beyond it."""
 SUM = 1e-9
 """To which part of it the parts of an error add up to it."""
-LARGEST = "largest"
-"""Before the name of a part: its largest anywhere, which may have a limit; without, its share of the worst error."""
 FLOOR = 0.5
 """A number is judged where at least this part of the time for which the truth must be trusted was
 compared; that of a stored run with the same deviation, which was compared as far, is judged by it."""

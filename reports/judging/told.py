@@ -161,7 +161,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     if loose:
         loose.sort(key=lambda one: -share(one[1]))
         text += f" Beyond a limit for a known cause, and not judged: {_named(_caused(loose))}."
-        does = (remedy(run.who, run.rows, row["metric"]) for run, row in loose[:NAMED])
+        does = (remedy(run.who, run.rows, row["metric"], run.label) for run, row in loose[:NAMED])
         text += "".join(f" {one}" for one in dict.fromkeys(does) if one)
     return f"{text}{_known_until(runs)}"
 

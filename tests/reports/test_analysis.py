@@ -455,7 +455,7 @@ def test_a_block_on_its_edge_falls_as_its_closed_form_does():
 def test_a_slide_downhill_turns_into_its_direction():
     """y' dies out at mu g cos(slope)/|v| beside a slip along x."""
     case = cases.load("sliding_block", "stops")
-    slides, holds = analyse.places(case)
+    holds, slides = analyse.places(case)
     press = case.number("gravity") / np.hypot(1.0, case.number("slope"))
     rates = np.sort(slides.model.poles().real)
     np.testing.assert_allclose(rates[2], -case.number("mu") * press / case.number("speed"), rtol=1e-9)

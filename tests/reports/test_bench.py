@@ -24,7 +24,7 @@ from crossbody.reports.bench.figure import work_precision
 from crossbody.reports.bench.headline import REFERENCE, headline
 from crossbody.reports.bench.ladder import Effort, Ladder
 from crossbody.reports.bench.measure import COLUMNS, bench, joined
-from crossbody.reports.bench.order import orders, says
+from crossbody.reports.bench.order import orders, says, stays
 from crossbody.reports.bench.scenes import DROP, QUICK
 from crossbody.reports.bench.throughput import best_pair
 from crossbody.reports.cli import main
@@ -157,6 +157,22 @@ def test_a_floor_takes_nothing_from_an_order(drawn: list[tuple[float, float, int
     for k, (p, *_) in enumerate(drawn):
         assert found.loc[f"e{k}", "order"] == pytest.approx(p, rel=1e-9)
         assert found.loc[f"e{k}", ["profile", "promised", "says"]].to_list() == [f"p{k % 2}", p + 0.4, "converges"]
+
+
+@pytest.mark.parametrize(
+    ("errors", "said"),
+    [
+        ([0.0262, 0.0188, 0.0064, 0.0039, 0.0047, 0.0053], "its error does not fall below dt = 0.125"),
+        ([0.02, 0.018, 0.017, 0.0165], "its error does not fall below dt = 0.5"),
+        ([0.4, 0.2, 0.1, 0.05, 0.025], ""), ([0.3, 0.1, 0.01, 1e-3, 9e-4, 9e-4, 9e-4], ""), ([1e-13] * 5, ""),
+        ([0.5, 0.1], ""),
+    ],
+)  # fmt: skip
+def test_errors_that_do_not_fall_any_further_are_told(errors: list[float], said: str) -> None:
+    """Those of a rung may be small by chance, where two parts of an error cancel: an order hides what remains."""
+    dt = [0.5**k for k in range(len(errors))]
+    assert stays("dt", dt, errors, 0.0) == (said and f"does not converge to the truth of the case: {said}")
+    assert not stays("dt", dt, errors, 1.0), "what the truth is known to"
 
 
 def test_every_engine_declares_what_it_promises() -> None:

@@ -17,7 +17,9 @@ from crossbody.reports.sweep.map import in_words
 
 def compared(*rows: tuple[str, str, float, str | None]) -> pd.DataFrame:
     """(case, engine, ratio, ahead)."""
-    return pd.DataFrame(rows, columns=["case", "engine", "ratio", "ahead"]).assign(profile="matched")
+    return pd.DataFrame(rows, columns=["case", "engine", "ratio", "ahead"]).assign(
+        profile="matched", ratio_native=np.nan
+    )
 
 
 def test_a_headline_says_who_is_slower_who_is_not_and_who_reaches_no_error() -> None:
@@ -25,12 +27,18 @@ def test_a_headline_says_who_is_slower_who_is_not_and_who_reaches_no_error() -> 
     lost = compared(("a", "lost", np.nan, None), ("b", "lost", np.nan, None))
     assert summary(pd.concat([rows, lost], ignore_index=True)) == (
         "The compiled reference is faster at every error in 2 of 3 comparisons (4 to 40 times at the engine's best "
-        "error); not in quick:matched. 2 reach no error: lost:matched (2 cases)."
+        "error, without what is Python of its run); not in quick:matched. 2 reach no error: lost:matched (2 cases)."
     )
     assert summary(rows.head(1)) == (
-        "The compiled reference is faster at every error in 1 of 1 comparison (40 to 40 times at the engine's best "
-        "error)."
+        "The compiled reference is faster at every error in 1 of 1 comparison (40 times at the engine's best "
+        "error, without what is Python of its run)."
     )
+
+
+def test_an_engine_is_told_by_its_own_loop_where_it_has_one() -> None:
+    """What Python takes around every step is no time of the engine."""
+    rows = compared(("a", "slow", 77.0, "yes"), ("b", "slow", 9.0, "yes")).assign(ratio_native=[5.8, np.nan])
+    assert "(5.8 to 9 times at" in summary(rows)
 
 
 @pytest.mark.parametrize("seed", range(10))

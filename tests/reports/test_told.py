@@ -14,6 +14,7 @@ from crossbody.cases.defaults import limits_of
 from crossbody.reports.importers.compare import OK, QUANTITIES, Row
 from crossbody.reports.importers.told import grid
 from crossbody.reports.judging.parts import part_of
+from crossbody.reports.judging.remedies import remedy
 from crossbody.reports.judging.told import NAMED, known_until, runs_of, sentence
 from crossbody.reports.judging.verdict import UNMEASURED, Word
 from crossbody.reports.pages import grid as pages_grid
@@ -236,3 +237,22 @@ def test_a_run_beyond_its_limit_is_told_what_makes_its_error_smaller(
     assert text.startswith("No number of the run is outside. Beyond a limit")
     without = sentence(runs_of([rows[0] | {"settings": "tol=1e-9"}, *rows[1:]]))
     assert "makes it smaller" not in without
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_parts_keep_their_signs_and_a_step_makes_no_error_smaller_than_the_models_own(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    whole = float(10.0 ** rng.uniform(-3, 0))
+    model = whole * float(rng.uniform(-0.4, 1.6))
+    parts = {"position (model)": model, "position (step)": whole - model, "largest position (model)": 2.0 * abs(model)}
+    more = {"settings": "dt=0.002", "known": 1e-9}
+    rows = [row("mujoco:as_is", Word.INFO, "position", value=whole, **more)]
+    rows += [row("mujoco:as_is", Word.INFO, name, value=value, **more) for name, value in parts.items()]
+    said = remedy("mujoco:as_is", rows, "position", "arm:slide")
+    assert said.startswith("Parts of the error of position of mujoco:as_is on arm:slide: ")
+    told = {part: float(share) / 100.0 for part, share in re.findall(r"(model|step) (-?[\d.e+]+) %", said)}
+    assert sum(told.values()) == pytest.approx(1.0, abs=0.01)
+    if abs(model) > abs(whole - model):
+        assert "no shorter step makes it smaller" in said
+    else:
+        assert f"makes it smaller, to {2.0 * abs(model):.2g} at best, which the model alone is off elsewhere." in said
