@@ -98,10 +98,12 @@ def observable(model: LinearModel, tolerance: float = RANK) -> int:
 
 
 def _scales(A: Floats) -> Floats:
+    """Sizes of states by which A is balanced; what rounding leaves of zeros in it would drive them to any size."""
     from scipy.linalg import matrix_balance
 
+    plain = np.where(np.abs(A) > np.finfo(float).eps * np.abs(A).max(initial=0.0), A, 0.0)
     with np.errstate(invalid="ignore"):  # of a permutation that is not asked for, and that it reads all the same
-        _, (scale, _) = matrix_balance(A, permute=False, separate=True)
+        _, (scale, _) = matrix_balance(plain, permute=False, separate=True)
     return np.asarray(scale, dtype=np.float64)
 
 

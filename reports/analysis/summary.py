@@ -19,7 +19,7 @@ Told = Mapping[Any, Any]
 COLUMNS = (
     "place", "verdict", "growth", "grows", "slowest", "slow", "fastest", "fast", "step", "limited_by", "own_step",
 )  # fmt: skip
-STABLE, UNSTABLE, NEUTRAL = "stable", "unstable", "neither"
+STABLE, UNSTABLE, NEUTRAL, MOVES = "stable", "unstable", "neither", "no equilibrium"
 NAMED = 3  # places that a sentence names
 SAME = 1e-6  # part of a rate by which two count as one
 
@@ -49,7 +49,9 @@ def _row(place: Place, poles: pd.DataFrame, own: float) -> dict[str, Any]:
     step, limited = largest_step(place) if stands else (np.nan, "")
     one_way = np.asarray(place.system.unilateral)[place.trim.active].any()
     return {
-        "place": place.name, "verdict": UNSTABLE if growth > rest else NEUTRAL if growth >= -rest else STABLE,
+        "place": place.name,
+        "verdict": MOVES if place.name.endswith(MOVING) else UNSTABLE if growth > rest
+        else NEUTRAL if growth >= -rest else STABLE,
         "growth": growth, "grows": poles["led_by"].iloc[first], "slowest": float(size[slow]),
         "slow": poles["led_by"].iloc[slow], "fastest": float(size[fast]), "fast": poles["led_by"].iloc[fast],
         "step": step, "limited_by": limited,
@@ -95,6 +97,8 @@ def over(parameter: str, ends: tuple[float, float], limits: pd.DataFrame) -> str
 
 
 def _verdict(label: str, rows: Sequence[Told]) -> str:
+    if all(row["verdict"] == MOVES for row in rows):
+        return f"{label}: no equilibrium; poles are those of the motion at {len(rows)} of its instants."
     worst = max(rows, key=lambda row: row["growth"])
     ends = {
         UNSTABLE: f"{UNSTABLE}, {worst['grows']} grows at {worst['growth']:.3g} 1/s",

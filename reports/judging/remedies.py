@@ -51,6 +51,8 @@ def _at_best(own: Mapping[str, Row], metric: str) -> str:
     least = math.nan if row is None else abs(_number(row["value"]))
     if row is None or not least > _number(row.get("known")):
         return ""
+    if least >= abs(own[metric]["value"]):
+        return f" there, but elsewhere the model alone is off by {least:.2g}"
     return f", to {least:.2g} at best, which the model alone is off elsewhere"
 
 

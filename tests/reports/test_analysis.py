@@ -30,7 +30,7 @@ from crossbody.reference.sundials.equations import Equations
 from crossbody.reports.analysis import numbers
 from crossbody.reports.analysis import places as analyse
 from crossbody.reports.analysis.loci import Family, limits
-from crossbody.reports.analysis.summary import over
+from crossbody.reports.analysis.summary import over, sentence, summary
 
 RNG = np.random.default_rng(27)
 LAW = RowLaw(a0=1e4, a1=50.0)
@@ -288,6 +288,17 @@ def test_ranks_of_a_model_built_with_them(reached, scale):
     assert observable(turned) == reached
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_ranks_do_not_hang_on_what_rounding_leaves_of_zeros(seed):
+    """One entry of 1e-62 scaled states by 1e125, and of sixteen that outputs show one was left."""
+    rng, n = np.random.default_rng(seed), 6
+    A = np.where(rng.random((n, n)) < 0.5, rng.normal(size=(n, n)), 0.0)
+    noise = np.where(A == 0.0, 10.0 ** rng.uniform(-120, -30, (n, n)), 0.0)
+    B, C = rng.normal(size=(n, 1)), rng.normal(size=(1, n))
+    for rank in (controllable, observable):
+        assert rank(model(A + noise, B, C)) == rank(model(A, B, C))
+
+
 def test_a_symmetric_robot_is_seen_and_reached_from_one_motor():
     (place,) = analyse.places(cases.load("delta_impulse"), {"x": 0.05, "y": 0.02, "z": 0.55})
     assert controllable(place.model) == observable(place.model) == 6
@@ -460,6 +471,9 @@ def test_a_slide_downhill_turns_into_its_direction():
     rates = np.sort(slides.model.poles().real)
     np.testing.assert_allclose(rates[2], -case.number("mu") * press / case.number("speed"), rtol=1e-9)
     assert holds.name == "held by floor:block"
+    rows = summary([slides], case)
+    assert rows["verdict"].tolist() == ["no equilibrium"]
+    assert "no equilibrium; poles are those of the motion at 1 of its instants." in sentence(case.label, rows, 1)
 
 
 def test_a_page_of_places_without_any_model_says_why(tmp_path):
