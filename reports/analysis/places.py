@@ -256,7 +256,7 @@ def _seen(
     held, places, why = not one_way, list[Place](), ""
     for i in tried:
         try:
-            places.append(_place(case, name, list(rows), held=held, q=run.q[i], t=float(run.t[i]), system=system))
+            places.append(_place(case, name, list(rows), held=held, q=run.q[i], t=float(run.t[k]), system=system))
         except SceneError as error:
             why = why or str(error)
     if not places:

@@ -31,6 +31,9 @@ from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.runs.watch import LIMIT
 from crossbody.reports.voice import progress
 
+CHANGED = 10
+"""Verdicts that are named of those that have changed since another run."""
+
 
 def run(
     cases: Sequence[Case], sources: Sequence[str], names: Sequence[str], wanted: Sequence[str], pairs: Sequence[str],
@@ -90,15 +93,32 @@ def run(
             )  # after the verdicts: templates take longer to import than to fill
 
             site.write(made, against=against, others=others)
+            since = [] if against is None else changed(results.verdicts_of(made), results.verdicts_of(against), against)
     read_again.check(out, rows, times)
     if untold is not None:
         raise untold
     if not voice.silent():
+        for line in since:
+            click.echo(layout.told(line))
         show_unselected(wanted)
         show_time([*clock, perf_counter()], times, count.seconds - compiled)
     where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
     return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
+
+
+def changed(now: Sequence[Row], before: Sequence[Row], name: Path) -> list[str]:
+    """Say how many verdicts and values have changed since a run of that name, and which verdicts first."""
+    from crossbody.reports.pages.index_page import changes  # with templates
+
+    found = changes(now, before, str(name))
+    words = next((table.rows for table in found.tables if table.title == "Verdicts that changed"), ())
+    told = [
+        f"changed: {row['who']} on {row['label']}: {row['metric']} was {row['verdict_before']}, is {row['verdict']}"
+        for row in words
+    ]
+    more = [f"changed: {len(told) - CHANGED} more; the index lists all"] if len(told) > CHANGED else []
+    return [found.text, *told[:CHANGED], *more]
 
 
 def _check_any(rows: Sequence[Row]) -> None:

@@ -49,12 +49,14 @@ def sections(out: Path) -> tuple[Section, ...]:
     from crossbody.reports.replay import figure
 
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
-    estimates["half"] = (estimates["high"] - estimates["low"]) / 2.0
+    low, high = (estimates[end].astype(float) for end in ("low", "high"))  # None where a fit was stopped
+    estimates["half"] = (high - low) / 2.0
     held["means"], held["unit"] = held["error"].map(MEANS), _unit(out)
     told = read_json(out / "identify.json")["provenance"]["fit"]
     windows = [len(told[name]) for name in ("fitted", "held")]
     how = f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."
     text = " ".join([*told["warnings"], how, OF_FIT])
+    says = summary(estimates, held, *windows)
     estimates["identifiable"] = estimates["identifiable"].map({True: "yes", False: "no"})
     tables = (
         Table(title="Estimates", columns=ESTIMATES, rows=records(_only(estimates, ESTIMATES)), file="identify.csv"),
@@ -70,7 +72,6 @@ def sections(out: Path) -> tuple[Section, ...]:
         plots.append(Plot(name="identify-profile", figure=figure.profile(drawn["profile"], estimates)))
     if len(estimates) > 1 and len(drawn.get("correlation", ())):
         plots.append(Plot(name="identify-correlation", figure=figure.together(drawn["correlation"])))
-    says = summary(estimates, held, *windows)
     first = Section(name="identify", title="Identified parameters", says=says, text=text, tables=tables)
     if not plots:
         return (first,)
