@@ -36,10 +36,10 @@ HAPPENS = {
 }  # fmt: skip
 """What a contact does when it comes into a mode."""
 TEXT = (
-    "All engines at the same time, which the plots below share. Arrows are contact forces, with "
-    "lengths proportional to the force; each shows the largest force since the previous frame, so "
-    "that no impact is missed. An instantaneous collision has an impulse instead of a force: a "
-    "hollow arrow that fades. An arrow that is cut off has a bar across. Differences from the truth can be "
+    "All engines at the same time, which the plots below share. Arrows are the forces of contacts along their "
+    "normals, without friction, and of loops, with lengths proportional to the force; each shows the largest force "
+    "since the previous frame, so that no impact is missed. An instantaneous collision has an impulse instead of a "
+    "force: a hollow arrow that fades. An arrow that is cut off has a bar across. Differences from the truth can be "
     "exaggerated 10 and 100 times, of all engines or of one, at the scale of the picture, which they may leave."
 )
 

@@ -42,7 +42,12 @@ def in_words(rows: pd.DataFrame) -> str:
     """Say how many runs end as they must, who does not and how, and the largest error that a truth knows."""
     bad, judged = failures(rows), rows[rows["tier"] != ""]
     ran = int((~rows["outcome"].isin([SKIPPED, REFUSED])).sum())
-    told = [f"{ran - len(bad)} of {ran} runs end at their horizon and within their limits"]
+    good = rows.drop(index=bad.index)
+    untold = int((good["verdict"] == Word.INFO).sum())
+    ends = f"{ran - len(bad)} of {ran} runs end at their horizon"
+    told = [
+        f"{ends} and within their limits" if not untold else f"{ends}, {untold} of them without a limit: not judged"
+    ]
     if len(bad):
         each = bad.groupby(bad["engine"] + ":" + bad["profile"], sort=False)
         told.append("; not " + "; not ".join(f"{len(own)} of {who}: {_ends(own)}" for who, own in each))

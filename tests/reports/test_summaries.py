@@ -65,6 +65,10 @@ def test_a_sweep_says_how_many_end_as_they_must_and_who_does_not() -> None:
     assert in_words(runs(good, good)) == (
         "2 of 2 runs end at their horizon and within their limits. 2 had a truth, the largest error is 1e-09."
     )
+    untold = (Outcome.FINISHED.value, Word.INFO, np.nan)
+    assert in_words(runs(good, untold, untold)).startswith(
+        "3 of 3 runs end at their horizon, 2 of them without a limit: not judged."
+    )
     bad = [(Outcome.FINISHED.value, Word.OUTSIDE, 0.5), (Outcome.STEP_TOO_SMALL.value, Word.WITHIN, np.nan)]
     told = in_words(runs(good, *bad, ("skipped", Word.WITHIN, np.nan)))
     assert told.startswith("1 of 3 runs end at their horizon and within their limits; not 2 of e:p: ")
