@@ -126,16 +126,25 @@ def model(name: str) -> Named:
 
 
 def one(name: str) -> Named:
-    """Return what can be asked of the case, file, engine or model of that name."""
+    """Return what can be asked of the case, file, engine or model of that name, or what a metric or a suite is."""
     from crossbody import cases, engines
     from crossbody.cases.loading import parted
     from crossbody.hw import models
+    from crossbody.reports import metrics, suites
 
+    told = {"Metrics": metrics, "Stress suites": suites}
+    summaries = {title: {name: source.summary(name)} for title, source in told.items() if name in source.names()}
     known = (*cases.names(), *engines.names(), *models.names())
     head = name if "." in name else parted(name)[0]
     if "." not in name and head not in known:
+        if summaries:
+            return summaries
         raise cases.UnknownName("case, engine or model", head, known)
-    return engine(name) if head in engines.names() else model(name) if name in models.names() else case(name)
+    if head in engines.names():
+        return engine(name)
+    if name in models.names():
+        return model(name)
+    return case(name)
 
 
 def text(told: Named) -> str:

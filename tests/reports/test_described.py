@@ -101,6 +101,13 @@ def test_a_file_is_listed_with_every_name_that_its_options_take(tmp_path: Path) 
     assert [*told.get("Rows", ()), *told["Rows if its motion comes to a contact with friction"]] == list(rubs.contacts)
 
 
+def test_metrics_and_suites_that_list_names_are_described() -> None:
+    listed = described.everything()
+    for title in ("Metrics", "Stress suites"):
+        for name, line in listed[title].items():
+            assert described.one(name)[title] == {name: line}
+
+
 def test_an_unknown_case_is_a_sentence() -> None:
     with pytest.raises(cases.UnknownName, match="There is no case 'newton'"):
         described.case("newton")
