@@ -40,7 +40,9 @@ def headline(rows: pd.DataFrame) -> pd.DataFrame:
 def summary(rows: pd.DataFrame) -> str:
     """Say of a headline how often the compiled reference is faster, by how much, and how many reach no error."""
     reached = rows[rows["ahead"].notna()]
-    best = rows["ratio_native"].astype(float).fillna(rows["ratio"].astype(float))
+    best = rows["ratio"].astype(float)
+    if "ratio_native" in rows:  # an older table has none
+        best = rows["ratio_native"].astype(float).fillna(best)
     told = [f"The compiled reference is faster at every error in {_of(rows['ahead'] == 'yes', reached)}"]
     if best.notna().any():
         told.append(f" ({_range(best)} times at the engine's best error, without what is Python of its run)")

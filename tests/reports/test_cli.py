@@ -214,7 +214,7 @@ def test_bench_times_every_rung(capsys: pytest.CaptureFixture[str]) -> None:
     assert (rows["median_ms"] > 0).all()
     orders = pd.read_parquet("out/orders.parquet").set_index("profile")["says"]
     assert orders["exact"] == "exact at every setting"
-    assert orders["off"] == "does not converge to the truth of the case"
+    assert orders["off"].startswith("does not converge to the truth of the case")
     assert "work-precision" in Path("out/index.html").read_text()
 
 
