@@ -230,18 +230,15 @@ def remaining(errors: Sequence[Floats]) -> float:
     return float(last / (LEAST_RATIO - 1.0))
 
 
-def settled(case: Case, truth: Truth, run: Trajectory, study: Study) -> bool:
+def settled(positions: Positions, study: Study) -> bool:
     """Return whether finer steps than those of a study would tell little more of the parts of an error.
 
     They show an order, or what follows is a small part (`SETTLED`) of the whole error.
 
     Args:
-        case: what was run.
-        truth: what the whole error is measured against.
-        run: the engine as it was judged.
+        positions: errors of the run that is judged; what was laid for a shorter study is laid there already.
         study: its runs at falling steps.
     """
-    positions = Positions(case, truth, truth.compared(run))
     if not positions.whole.size:
         return True
     positions.expect(study.runs)
@@ -338,9 +335,9 @@ class Positions:
         return self.laid[id(run)]
 
     def expect(self, runs: Sequence[Trajectory]) -> None:
-        """Have the truth found at once for all runs that will be laid on it."""
+        """Have the truth found at once for all runs that will be laid on it, but for those that are."""
         if self.whole.size:
-            clocks = (self._clock(self.truth, run) for run in runs if len(run.t))
+            clocks = (self._clock(self.truth, run) for run in runs if len(run.t) and id(run) not in self.laid)
             self.truth.expect(_asked(t, distinct(_around(t, self.t)), self.truth) for t in clocks)
 
     def _lay(self, run: Trajectory, truth: Truth, instants: Floats) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 
 from crossbody import engines
 from crossbody.cases import Case, CaseUnsupported, Trajectory, Value
-from crossbody.reports.judging.parts import RATIO, Study, settled
+from crossbody.reports.judging.parts import RATIO, Positions, Study, settled
 from crossbody.reports.measuring.truth import Truth
 from crossbody.reports.runs.choice import Pick
 
@@ -117,8 +117,10 @@ def _further(
         took: what a run takes, s, times its step, s.
         most: what all runs may take, s.
     """
-    left = most - sum(took / size for size in study.sizes)
-    while study.setting == "dt" and not settled(case, truth, judged, study):
+    if study.setting != "dt":
+        return study
+    left, positions = most - sum(took / size for size in study.sizes), Positions(case, truth, truth.compared(judged))
+    while not settled(positions, study):
         size = study.sizes[-1] / RATIO
         left -= took / size
         if left < 0.0 or case.t_end / size > MOST_STEPS:

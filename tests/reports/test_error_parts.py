@@ -254,8 +254,9 @@ def test_steps_are_halved_until_the_parts_are_settled_or_there_is_no_time(
     assert len(found.runs) == len(found.sizes)
     assert (len(found.sizes) == 3) == (seconds < 1.0)
     if seconds > 1.0:
-        assert settled(case, truth, runs[0], found)
-        assert not settled(case, truth, runs[0], replace(found, sizes=found.sizes[:-1], runs=found.runs[:-1]))
+        laid = Positions(case, truth, truth.compared(runs[0]))
+        assert settled(laid, found)
+        assert not settled(laid, replace(found, sizes=found.sizes[:-1], runs=found.runs[:-1]))
         told = split(case, truth, runs[0], found)
         assert abs(told.largest["model"] - 1e-2 * case.t_end**2) <= told.known["model"]
 
