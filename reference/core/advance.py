@@ -310,9 +310,7 @@ def _arrive(K: Any, s: Any, m: Model, w: Work, b: Buffers, t: float, at_stop: bo
 def _stop_at_once(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Go to the next stop where contacts have switched so near before it that no step fits between."""
     s.t = s.stop
-    while not s.natural and s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:
-        record.write_row(s, w, b.mode, b.samples[s.next_sample], w.y, w.lam0, w.z, b.out, b.modes)
-        s.next_sample += 1
+    record.samples_here(s, w, b.mode, b.samples, b.out, b.modes)
     if s.stop < s.t_end:
         return _go_on(K, s, m, w, b)
     record.here(K, s, m, w, b.mode, b.out, b.modes, False)
@@ -367,9 +365,7 @@ def _begin(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
         touches.follow(s, m, w, b.mode)
     K.energy(w.y[: s.nq], w.y[s.nq :], m.p, w.e)
     record.here(K, s, m, w, b.mode, b.out, b.modes, True)
-    while s.next_sample < len(b.samples) and b.samples[s.next_sample] <= s.t:
-        record.write_row(s, w, b.mode, s.t, w.y, w.lam0, w.z, b.out, b.modes)
-        s.next_sample += 1
+    record.samples_here(s, w, b.mode, b.samples, b.out, b.modes)
     return LOST if lost else 0
 
 

@@ -59,6 +59,14 @@ def here(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Byt
 
 
 @compiled
+def samples_here(s: Any, w: Work, mode: Bytes, samples: Floats, out: Floats, modes: Bytes) -> None:
+    """Append the samples asked for up to the present instant, which no step writes: they have the present state."""
+    while s.next_sample < len(samples) and samples[s.next_sample] <= s.t:
+        write_row(s, w, mode, samples[s.next_sample], w.y, w.lam0, w.z, out, modes)
+        s.next_sample += 1
+
+
+@compiled
 def step_end(K: Any, s: Any, m: Model, w: Work, mode: Bytes, out: Floats, modes: Bytes) -> None:
     """Append the end of a step in which nothing happened: its last node knows the gaps, its account the energies."""
     if s.natural and dense.long_for_rows(s):  # the node may have been moved onto the rows
