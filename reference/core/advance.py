@@ -310,10 +310,11 @@ def _arrive(K: Any, s: Any, m: Model, w: Work, b: Buffers, t: float, at_stop: bo
 def _stop_at_once(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Go to the next stop where contacts have switched so near before it that no step fits between."""
     s.t = s.stop
+    K.energy(w.y[: s.nq], w.y[s.nq :], m.p, w.e)
     record.samples_here(s, w, b.mode, b.samples, b.out, b.modes)
     if s.stop < s.t_end:
         return _go_on(K, s, m, w, b)
-    record.here(K, s, m, w, b.mode, b.out, b.modes, False)
+    record.here(K, s, m, w, b.mode, b.out, b.modes, True)
     return 0
 
 

@@ -57,6 +57,20 @@ def test_samples_beside_a_switch_at_the_horizon_are_all_there(name: str, variant
             np.testing.assert_array_equal(run.t, asked)
 
 
+@pytest.mark.parametrize("ledger", [True, False])
+@pytest.mark.parametrize(("name", "variant"), [*RUBS, *HITS])
+def test_a_sample_at_such_a_horizon_has_all_that_the_run_has_there(name: str, variant: str, ledger: bool) -> None:
+    """Its energy was that of the sample before where none is booked."""
+    case = cases.load(name, variant)
+    for t in instants(case):
+        for k in NEAR:
+            end = beside(t, k)
+            short = replace(case, t_end=end)
+            whole, run = ran(short, ledger=ledger), ran(short, ledger=ledger, samples=np.array([0.0, 0.5 * t, end]))
+            for signal in ("q", "v", "gap", "energy"):
+                np.testing.assert_allclose(getattr(run, signal)[-1], getattr(whole, signal)[-1], rtol=1e-8, atol=1e-8)
+
+
 @pytest.mark.parametrize("k", NEAR)
 def test_inputs_that_change_beside_a_switch_change(k: int, tmp_path: Path) -> None:
     path, table = ROOT / "tests" / "support" / "driven_ball.xml", tmp_path / "u.csv"
