@@ -44,6 +44,7 @@ TURNED = 1e-12
 MOST_SETS = 256
 BELOW = 1e-6  # part of its bound by which a force stays below it to count as that of a contact that sticks
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
+STRICT_IF_DRY, STRICT = 1, 2  # which sticks must be met where they depend on each other: of dry friction alone, or all
 
 
 @compiled
@@ -71,7 +72,8 @@ def _worst(s: Any, m: Model, w: Work) -> int:
             other, then = -1.0, STICK
             if w.state[i] == STICK:
                 other, then = (size_along(m, w, i, w.la) - bound(m, i, max(w.la[j], 0.0))) * w.gram[j, j], SLIP
-                other = max(other, carried_on(s, m, w, i), off_stick(s, m, w, i) if s.strict else 0.0)
+                strict = s.strict == STRICT or (s.strict == STRICT_IF_DRY and is_dry(m, i))
+                other = max(other, carried_on(s, m, w, i), off_stick(s, m, w, i) if strict else 0.0)
             elif w.stands[i]:
                 other = max(-ahead(m, w, i), abs(aside(m, w, i)))
             if other > missing:

@@ -6,6 +6,7 @@ from typing import Any
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.cones import within_bound, without_pull
+from crossbody.reference.core.contradictions import strays_into_jam
 from crossbody.reference.core.friction import (
     bound,
     count_from_none,
@@ -20,7 +21,16 @@ from crossbody.reference.core.layout import FREE, NO_CONSISTENT_MODES, PAINLEVE,
 from crossbody.reference.core.loads import INSIDE
 from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_path import approached
-from crossbody.reference.core.mode_search import ALL, WORST, iterate, judge, near_sets, swept
+from crossbody.reference.core.mode_search import (
+    ALL,
+    STRICT,
+    STRICT_IF_DRY,
+    WORST,
+    iterate,
+    judge,
+    near_sets,
+    swept,
+)
 from crossbody.reference.core.mode_set import (
     DIFFERENT,
     evaluate_set,
@@ -142,11 +152,12 @@ def _found(s: Any, m: Model, w: Work) -> bool:
 
 
 @compiled
-def _meet_all(s: Any, m: Model, w: Work) -> None:
+def _meet_all(s: Any, m: Model, w: Work) -> int:
     """Let sticks that contradict each other yield to a set that all rows meet, if there is one.
 
     Two feet of a body that turns cannot both stand. Where they contradict each other slightly, as those of a flat one
-    that rocks, or where no set is met, which is noted, they are met in the least squares.
+    that rocks, or where no set is met, which is noted, they are met in the least squares. What moves a contact then in
+    a direction in which it jams is no motion: that contact is returned, else -1.
     """
     most = 0.0
     for j in range(s.na if s.dependent_rows > 0 and s.leeway == 0.0 else 0):
@@ -154,13 +165,19 @@ def _meet_all(s: Any, m: Model, w: Work) -> None:
         if has_friction(m, i) and w.state[i] == STICK:
             most = max(most, off_stick(s, m, w, i))
     if most <= (0.0 if s.drifts else SLIGHT * s.push_scale):
-        return
-    s.strict = 1
+        return -1
+    s.strict = STRICT
+    if _found(s, m, w):
+        return -1
+    s.strict = STRICT_IF_DRY
     if not _found(s, m, w):
         s.strict = 0
         _found(s, m, w)
+    strays = strays_into_jam(s, m, w, SLIGHT * s.push_scale)
+    if strays < 0:
         note_first(s, True)
         s.unmet += 1
+    return int(strays)
 
 
 @compiled
@@ -224,7 +241,11 @@ def decide(s: Any, m: Model, w: Work) -> int:
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
         if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
             return _mark(s, m, w)
-    _meet_all(s, m, w)
+    strays = _meet_all(s, m, w)
+    if strays >= 0:
+        w.wants[:] = 0
+        w.wants[strays] = 1
+        return PAINLEVE
     if s.one_by_one:
         _begin_at_last(s, m, w)
     _hold_what_stands(s, m, w)

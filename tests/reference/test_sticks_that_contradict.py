@@ -108,9 +108,12 @@ ARM = """<mujoco><compiler angle="radian"/><default><geom friction="{mu} 0 0" so
 PUSHED, BRIEF = 0.16, 1e-5  # s: each pair of torques, and a stick that only a jump of these may end
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_dry_joints_that_a_contact_moves_turn_round_at_once(seed: int, tmp_path: Path) -> None:
-    """What prescribes a motion takes a dry joint through zero: it has no time to stick."""
+WEDGED = (19, 155, 198)
+"""Arms whose tip sticks where their limit and the floor move it towards where it jams."""
+
+
+def pushed(seed: int, tmp_path: Path, solver: str = "compiled", rtol: float = 1e-10) -> cases.Trajectory:
+    """Run a drawn arm under torques that jump."""
     rng = np.random.default_rng([seed, 43])
     dry = [float(rng.choice(sizes)) for sizes in ([0.1, 1.0], [0.1, 1.0], [0.0, 0.3])]
     path = tmp_path / "arm.xml"
@@ -118,11 +121,36 @@ def test_dry_joints_that_a_contact_moves_turn_round_at_once(seed: int, tmp_path:
     case = cases.from_file(str(path), friction=1)
     made = system(case.scene, case.law, np.array([0.5, 0.3]))
     inputs = (PUSHED * np.arange(4), 3.0 * rng.normal(size=(4, 2)))
-    found = simulate(made, np.array([0.5, 0.3]), 3.0 * rng.normal(size=2), 0.5, rtol=1e-10, inputs=inputs)
+    start = np.array([0.5, 0.3]), 3.0 * rng.normal(size=2)
+    return simulate(made, *start, 0.5, rtol=rtol, inputs=inputs, solver=solver)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_dry_joints_that_a_contact_moves_turn_round_at_once(seed: int, tmp_path: Path) -> None:
+    """What prescribes a motion takes a dry joint through zero: it has no time to stick."""
+    found = pushed(seed, tmp_path)
     assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), found.message
     sticks: dict[int, float] = {}
     for event in found.events:
         if event.after is Mode.STICK:
             sticks[event.contact] = event.t
-        elif event.before is Mode.STICK and event.t not in inputs[0] and event.t < found.t[-1]:
+        elif event.before is Mode.STICK and event.t not in PUSHED * np.arange(4) and event.t < found.t[-1]:
             assert event.t - sticks.get(event.contact, -np.inf) > BRIEF, event
+
+
+@pytest.mark.parametrize(
+    "first", [40, pytest.param(160, marks=pytest.mark.slow), pytest.param(280, marks=pytest.mark.slow)]
+)
+def test_no_arm_switches_for_ever(first: int, tmp_path: Path) -> None:
+    """Nor does one where the floor, a limit and its dry joints contradict each other: it goes on, or it jams."""
+    for seed in range(first, first + 120):
+        found = pushed(seed, tmp_path)
+        assert found.outcome in (Outcome.FINISHED, Outcome.PAINLEVE), (seed, found.message)
+
+
+@pytest.mark.parametrize("seed", WEDGED)
+def test_a_tip_that_is_wedged_jams_where_the_second_machine_says_so(seed: int, tmp_path: Path) -> None:
+    found, other = pushed(seed, tmp_path, rtol=1e-9), pushed(seed, tmp_path, "cvode", 1e-9)
+    assert found.outcome is other.outcome is Outcome.PAINLEVE
+    assert found.t[-1] == pytest.approx(other.t[-1], abs=1e-8)
+    assert "sticks_contradict" not in found.message
