@@ -124,7 +124,7 @@ class Trajectory:
             (`sticks_contradict`).
         searched_until: until when no other motion can keep the law, or was searched for, s; finite
             where too many contacts could change at one instant to try all their sets
-            (`not_searched`): what follows may be one motion of several.
+            (`not_searched`): what follows may be one motion of several. A truth tries more than a run.
         energy_gained: what touches with friction gave out beyond what they had taken in, J
             (`touches_that_gained`); only `compiled` with a ledger tells.
         control_s: part of `wall_s` that was spent in that controller, s.

@@ -19,7 +19,7 @@ from crossbody.engines._scene import masses
 from crossbody.engines.contract import Engine, Run
 from crossbody.engines.equations import equations_of, has_equations, module
 from crossbody.reference import Options, System, prepare
-from crossbody.reference.options import COLLISIONS, FSMS, LARGEST_ATOL, TOLERANCES
+from crossbody.reference.options import COLLISIONS, FSMS, LARGEST_ATOL, MOST_SETS, TOLERANCES
 from crossbody.reference.start import NOT_FOUND, OffRowsError
 
 DEPENDENT = 1e6
@@ -188,7 +188,7 @@ class Reference(Engine):
             case: the scene.
             profile: one of `profiles`.
             settings: rtol, atol, ledger, samples, fsm, max_steps, time_limit; shortcuts and
-                implicit of `compiled`, and of a scene in it traced, "kept", "yes" or "no"; index
+                implicit of `compiled`, and of a scene in it most_sets and traced, "kept", "yes" or "no"; index
                 of `ida`. `samples` is a number of equidistant rows, or their times.
 
         Raises:
@@ -240,6 +240,8 @@ def _known(case: Case, solver: str) -> dict[str, Parameter]:
         known["shortcuts"] = Parameter(default=True, doc="closed-form arcs if the scene is affine", low=0, high=1)
         known["implicit"] = Parameter(default=True, doc="the implicit method if the law is stiff", low=0, high=1)
     if solver == "compiled" and case.general:
+        sets = "sets of modes of which all are tried to see whether a second motion keeps the law"
+        known["most_sets"] = Parameter(default=64, doc=sets, low=MOST_SETS[0], high=MOST_SETS[1])
         known["traced"] = Parameter(default=KEPT, doc="code compiled only for this model", choices=tuple(TRACED))
     if solver == "ida":
         known["index"] = Parameter(default=1, doc="1, or 3 for bilateral rows", low=1, high=3)

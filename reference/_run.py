@@ -140,6 +140,7 @@ class CompiledRun:
             "loops": system.solve is None and bool(np.any(system.held)),
             "keep_events": options.events, "has_energy": system.energy is not absent.energy,
             "has_control": system.control is not None,
+            "most_sets": options.most_sets,
             "rtol": options.rtol, "atol": options.tolerance, "t_end": options.t_end, "h_max": options.max_step,
             "tick": system.tick,
         }  # fmt: skip

@@ -22,6 +22,7 @@ COLLISIONS = ("sequential", "simultaneous", "resolved")
 SOLVERS = ("compiled", "ida", "cvode")
 TOLERANCES = (1e-14, 1e-1)
 LARGEST_ATOL = 1e100  # its square is still a number
+MOST_SETS = (1, 4**12)
 ATOL_PART = 1e-3  # default absolute tolerance in units of rtol: gaps are small against heights
 
 
@@ -44,6 +45,7 @@ class Chosen(TypedDict, total=False):
     index: int
     max_step: float
     max_steps: int
+    most_sets: int
     time_limit: float
 
 
@@ -78,6 +80,9 @@ class Options:
         index: 1, or 3 for bilateral rows under "ida".
         max_step: longest step, s.
         max_steps: bound on steps.
+        most_sets: sets of modes of contacts with friction up to which, at an instant at which some
+            change, all are tried to see whether a second motion keeps the law (`searched_until`);
+            of `compiled`.
         time_limit: bound on processor time, s, and ten times as long by the clock; looked at
             between slices of steps. It does not end a kernel that never returns: only its process
             can be ended, as the command line does.
@@ -100,6 +105,7 @@ class Options:
     index: int = 1
     max_step: float = math.inf
     max_steps: int = 1_000_000
+    most_sets: int = 64
     time_limit: float = math.inf
 
     def __post_init__(self) -> None:
@@ -118,6 +124,7 @@ class Options:
         within("t_end", self.t_end, 0.0, math.inf, open_low=True)
         within("max_step", self.max_step, 0.0, math.inf, open_low=True, infinite=True)
         within("max_steps", self.max_steps, 1, math.inf, infinite=True)
+        within("most_sets", self.most_sets, *MOST_SETS)
         if math.isfinite(self.max_steps) and self.max_steps != int(self.max_steps):
             raise InvalidValue(f"max_steps is {self.max_steps!r}; it must be a whole number, or infinite.")
         within("time_limit", self.time_limit, 0.0, math.inf, open_low=True, infinite=True)

@@ -184,6 +184,7 @@ STATE = np.dtype(
         ("not_unique", "i8"),  # instants at which more than one set of modes was consistent,
         ("unmet", "i8"),  # instants at which sticks contradicted each other in every set that was found,
         ("unique_until", "f8"),  # s: and the first of either
+        ("most_sets", "i8"),  # that are all tried to see whether another is consistent
         ("not_searched", "i8"),  # instants at which there were too many sets to see whether another was
         ("searched_until", "f8"),  # s: and the first of these
         ("push_scale", "f8"),  # size of the terms behind the rows' right-hand sides

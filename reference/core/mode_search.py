@@ -42,6 +42,7 @@ SWEEPS = 60
 TURNS = 40  # of directions of slip towards those of acceleration
 TURNED = 1e-12
 MOST_SETS = 256
+EVERY = -1  # island
 BELOW = 1e-6  # part of its bound by which a force stays below it to count as that of a contact that sticks
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
 STRICT_IF_DRY, STRICT = 1, 2  # which sticks must be met where they depend on each other: of dry friction alone, or all
@@ -220,15 +221,17 @@ def swept(s: Any, m: Model, w: Work, together: int) -> bool:
 
 
 @compiled
-def vary(s: Any, m: Model, w: Work, number: int) -> int:
+def vary(s: Any, m: Model, w: Work, number: int, island: int) -> int:
     """Put contacts in the modes that a number says digit by digit, 0 for that of w.sets[0]; how many differ.
+
+    They are those of an island by w.island, or all for EVERY.
 
     Directions of slip are those of reference, and of the digit 3 their opposites.
     """
     changed = 0
     for j in range(s.na):
         i = w.idx[j]
-        if is_decided(w, i):
+        if is_decided(w, i) and island in (EVERY, w.island[j]):
             digit, number = number % 4, number // 4
             changed += digit > 0
             start = w.sets[0, i]
@@ -273,7 +276,7 @@ def near_sets(s: Any, m: Model, w: Work) -> bool:
                 continue
             for i in range(s.nc):
                 w.way[i] = w.kept_way[i]
-            vary(s, m, w, number)
+            vary(s, m, w, number, EVERY)
             if judge(s, m, w) < 0 and goes_on(s, m, w):
                 return True
             if jam < 0:

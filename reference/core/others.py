@@ -1,4 +1,7 @@
-"""Whether other sets of modes are consistent as well: none can be, all few are tried, or there are too many to try."""
+"""Whether other sets of modes are consistent as well: none can be, all are tried, or there are too many to try.
+
+Contacts that do not act on each other, through others either, are islands: each has its own sets.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,6 @@ from crossbody.reference.core.mode_set import (
 from crossbody.reference.core.unknowns import fill, list_unknowns
 from crossbody.reference.kinds import Floats
 
-FEW = 64  # sets, which are all tried
 DEFINITE = 1e-6  # square of a pivot, of rows of size 1, from which on a matrix is definite
 
 
@@ -32,16 +34,32 @@ def _choices(m: Model, w: Work, i: int) -> int:
 
 
 @compiled
-def _number(s: Any, m: Model, w: Work, place: int) -> int:
-    """The number of `vary` for a place among all combinations of `_choices`."""
+def _number(s: Any, m: Model, w: Work, place: int, island: int) -> int:
+    """The number of `vary` for a place among all combinations of `_choices` of an island."""
     number, unit = 0, 1
     for j in range(s.na):
         i = w.idx[j]
-        if is_decided(w, i):
+        if is_decided(w, i) and w.island[j] == island:
             digit, place = place % _choices(m, w, i), place // _choices(m, w, i)
             number += unit * (digit if w.stands[i] else 2 * digit)
             unit *= 4
     return number
+
+
+@compiled
+def _part(s: Any, m: Model, w: Work) -> None:
+    """Leave in w.island the lowest place of the rows that act on each one, through others too, or share its contact."""
+    for j in range(s.na):
+        w.island[j] = j
+    grows = True
+    while grows:
+        grows = False
+        for a in range(s.na):
+            for b in range(a):
+                beside = m.follows[w.idx[a]] == w.idx[b] or m.follows[w.idx[b]] == w.idx[a]
+                if (beside or w.gram[a, b] != 0.0) and w.island[a] != w.island[b]:
+                    least = min(w.island[a], w.island[b])
+                    w.island[a], w.island[b], grows = least, least, True
 
 
 @compiled
@@ -121,6 +139,31 @@ def note_first(s: Any, found: bool) -> None:
 
 
 @compiled
+def _sets(s: Any, m: Model, w: Work, island: int) -> int:
+    """How many sets of modes an island has; no more are counted than are tried, and a few."""
+    sets = 1
+    for j in range(s.na):
+        if w.island[j] == island and is_decided(w, w.idx[j]) and sets <= s.most_sets:
+            sets *= _choices(m, w, w.idx[j])
+    return sets
+
+
+@compiled
+def _moves_otherwise(s: Any, m: Model, w: Work, island: int, sets: int) -> bool:
+    """Whether another set of an island is consistent that leads to another motion; modes are put back."""
+    found = False
+    for place in range(1, sets):
+        for i in range(s.nc):
+            w.way[i] = w.kept_other[i]
+        vary(s, m, w, _number(s, m, w, place, island), island)
+        if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
+            for j in range(s.na):
+                found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
+    put_back(s, m, w)
+    return found
+
+
+@compiled
 def count_others(s: Any, m: Model, w: Work) -> None:
     """Note whether another set is consistent as well and leads to another motion, or that there are too many to try.
 
@@ -133,14 +176,6 @@ def count_others(s: Any, m: Model, w: Work) -> None:
     put_back(s, m, w)
     if monotone:
         return
-    sets = 1
-    for j in range(s.na):
-        if is_decided(w, w.idx[j]) and sets <= FEW:
-            sets *= _choices(m, w, w.idx[j])
-    if sets > FEW:
-        s.searched_until = s.t if s.not_searched == 0 else s.searched_until
-        s.not_searched += 1
-        return
     evaluate_set(s, m, w)
     for j in range(s.na):
         w.chosen[j] = w.excess[j]
@@ -149,14 +184,16 @@ def count_others(s: Any, m: Model, w: Work) -> None:
             aim(m, w, w.idx[j])
     for i in range(s.nc):
         w.kept_other[i] = w.way[i]
-    found = False
-    for place in range(1, sets):
-        for i in range(s.nc):
-            w.way[i] = w.kept_other[i]
-        vary(s, m, w, _number(s, m, w, place))
-        if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
-            for j in range(s.na):
-                found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale
+    _part(s, m, w)
+    found, all_tried = False, True
+    for island in range(s.na):
+        sets = _sets(s, m, w, island)
+        all_tried = all_tried and sets <= s.most_sets
+        if 1 < sets <= s.most_sets:
+            found = _moves_otherwise(s, m, w, island, sets) or found
+    put_back(s, m, w)
+    if not all_tried:
+        s.searched_until = s.t if s.not_searched == 0 else s.searched_until
+        s.not_searched += 1
     note_first(s, found)
     s.not_unique += found
-    put_back(s, m, w)

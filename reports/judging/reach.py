@@ -34,6 +34,9 @@ SHORT = {
 }
 """Ends of the tightest run up to which a motion is compared all the same, and why not further."""
 BEFORE = 1e-6  # part of the time that such a run got to by which its horizon is shorter at least
+SEARCHED = 4096
+"""Sets of modes of contacts with friction, of which a truth tries all to see whether a second motion keeps the law: of
+six contacts that stand; 256 of four take 5 ms an instant."""
 SHORTEST = 1e-3
 """Part of its horizon to which a motion is cut at most: one that gets no further stands still."""
 
@@ -97,7 +100,8 @@ def tight(case: Case, **bound: Any) -> Trajectory:
     """The compiled integrator at the case's tightest tolerance; what it meets that has no rows is seen."""
     from crossbody.engines import load
 
-    return load("reference").prepare(case, "compiled", rtol=case.tight, **bound).run()
+    searched = {"most_sets": SEARCHED} if case.general else {}
+    return load("reference").prepare(case, "compiled", rtol=case.tight, **searched, **bound).run()
 
 
 def motion(case: Case, rtol: float, **settings: Any) -> Trajectory:

@@ -121,7 +121,10 @@ def _integrated(case: Case, first: Trajectory, other: str, budget: float = BUDGE
         )
         run = motion(asked, case.tight, samples=np.array(times))
         # A run that is asked for samples need not take the same steps: its events move by the tolerance.
-        run = replace(with_both_sides(run, first), events=first.events, switches=first.switches)
+        run = replace(
+            with_both_sides(run, first), events=first.events, switches=first.switches, counts=first.counts,
+            unique_until=first.unique_until, searched_until=first.searched_until,
+        )  # fmt: skip
         return run if first.outcome.ok else replace(run, outcome=first.outcome, message=first.message)
 
     dense = at(sample_times(first, case.t_end))
@@ -282,13 +285,14 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
             min(truth.trajectory.unique_until, second.unique_until),
             "several sets of sticking, sliding and open contacts satisfy the law, or none is known to",
         ),
+        (truth.trajectory.searched_until, "too many contacts could change at an instant to search for a second motion"),
         (_arbitrary(truth, second, case), "the law does not determine which of several dependent rows opens first"),
     ]
     if truth.parted < case.t_end and grown[-1] > MULTIPLIED:
         why = f"until then the distance of neighbouring motions grows by {MULTIPLIED:g} times"
         reasons.append((float(t[np.argmax(grown > MULTIPLIED) - 1]), why))
-    until, why = min(reasons)
-    return Chaos(until=until, why=why) if 0.0 < until < min(case.t_end, truth.parted) else None
+    until, why = min((reason for reason in reasons if reason[0] > 0.0), default=(math.inf, ""))
+    return Chaos(until=until, why=why) if until < min(case.t_end, truth.parted) else None
 
 
 def _arbitrary(truth: Truth, second: Trajectory, case: Case) -> float:

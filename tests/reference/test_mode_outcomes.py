@@ -14,6 +14,8 @@ from crossbody import cases
 from crossbody.cases import Outcome, Tier
 from crossbody.cases.scene import Joint, RowLaw, Scene, Shape
 from crossbody.reference import simulate
+from crossbody.reports.judging.reach import tight
+from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.truth_row import truth_row
 from crossbody.reports.measuring.truth import from_run
 
@@ -74,6 +76,34 @@ def test_where_a_second_motion_is_not_looked_for_is_told() -> None:
     assert "too many contacts could change to search for a second motion" in row.why
     sphere = run(sphere_on_floor(0.5, 0.1), [0, 0, 0.1, 1, 0, 0, 0], *start)
     assert "not_searched" not in sphere.counts
+
+
+def stood(*places: tuple[float, float]) -> cases.Case:
+    """Boxes that fall flat: on the floor, and on the one before where they are above it; (x, z) of each."""
+    names = [f"box{k}" for k in range(len(places))]
+    shapes, pairs, law = [Shape(name="floor", type="plane")], [], RowLaw(a0=1e4, a1=100.0)
+    for k, ((_, z), name) in enumerate(zip(places, names, strict=True)):
+        shapes += [
+            Shape(name=name, body=name, type="box", size=HALF),
+            Shape(name=f"{name} top", body=name, type="plane", position=(0.0, 0.0, HALF[2])),
+        ]
+        pairs.append(pair(f"box{k - 1} top" if z > 2.0 * HALF[2] else "floor", name, 0.5, law))
+    scene = Scene(
+        bodies=tuple(box_body(name, HALF) for name in names), shapes=tuple(shapes), pairs=tuple(pairs),
+        joints=tuple(Joint(name=name, body=name, type="free") for name in names),
+    )  # fmt: skip
+    return cases.from_scene(scene, q0=np.concatenate([[x, 0, z, 1, 0, 0, 0] for x, z in places]), t_end=0.03)
+
+
+def test_a_truth_looks_for_a_second_motion_further_than_a_run_and_ends_where_it_cannot() -> None:
+    """Four corners have 256 sets, those of each of two boxes apart as well; eight that act on each other 65536."""
+    above = HALF[2] + 1e-3
+    beside, piled = stood((0.0, above), (1.0, above)), stood((0.0, above), (0.0, above + 2.0 * HALF[2] + 1e-3))
+    assert tight(beside).searched_until == np.inf
+    cut = truth_of(piled)
+    assert cut.horizon is not None
+    assert cut.horizon.until == cut.trajectory.searched_until < 0.03
+    assert "too many contacts" in cut.horizon.why
 
 
 def test_what_switches_for_ever_is_named() -> None:
