@@ -26,6 +26,7 @@ from crossbody.reference.ahead import ask
 from crossbody.reference.core import layout
 from crossbody.reference.core.bundles import table
 from crossbody.reference.kinds import Floats
+from crossbody.reference.notes import AMOUNTS, NOTES, noted
 from crossbody.reference.options import COLLISIONS, FSMS, Options
 from crossbody.reference.systems import absent
 
@@ -47,25 +48,6 @@ OUTCOMES = {
 }
 _ACTIVE = (layout.CONTACT, layout.COLLISION, layout.BILATERAL, layout.STICK, layout.SLIP)
 _COUNTERS = ("rejected", "rhs", "implicit_steps", "exact_steps", "factorisations", "collisions", "guards")
-_NOTES = {
-    "indeterminate": (
-        "indeterminate: how contacts that slid shared their load, which the law does not "
-        "determine, moved the bodies; the least norm was used."
-    ),
-    "not_unique": "modes_not_unique: more than one set of sticking and sliding contacts was consistent at an instant; "
-    "the one that was reached first was used.",
-    "unmet": "sticks_contradict: contacts that stuck at an instant excluded each other, and no set of modes was found "
-    "that all of them meet; they were met in the least squares.",
-    "touches_that_gained": "touches_that_gained: touches with friction ({touches_that_gained}) gave out more energy "
-    "than they took in, {energy_gained:.3g} J in all. The law prescribes how a gap moves whatever friction does to the "
-    "load (Kane's paradox); a larger a1 or a smaller mu dissipates more.",
-    "starts_inside": "starts_inside: contacts with friction ({starts_inside}) began below their surface and gave out "
-    "{energy_handed:.3g} J on their way out of it, which is in no energy at the start.",
-}
-_LOOPS_PRESS = (
-    "indeterminate: loops hold a contact that may slide, so that its normal force and friction are "
-    "undetermined; it was computed without friction."
-)
 _EVENT_BUFFERS = ("events_t", "events", "impulses", "switches_t", "switches")
 
 
@@ -95,7 +77,7 @@ class CompiledRun:
         self.start_state = np.concatenate([q0, v0])
         samples, (inputs_t, inputs_u) = options.grid(), options.schedule(system)
         n, nq, nc = system.n, system.nq, system.nc
-        self.nz = nc + 2 if options.ledger else 0
+        self.nz = nc + 2 if options.ledger or system.frictional else 0  # what touches with friction gain is told
         self.work = layout.workspace(
             n, nq, system.velocity is not None, nc, system.inputs,
             system.mass_block, self.nz, system.memory, system.scratch, system.guards,
@@ -133,7 +115,7 @@ class CompiledRun:
             "has_solve": system.solve is not None, "constant_mass": system.constant_mass,
             "affine": system.affine and options.shortcuts and not system.frictional,
             "implicit": options.implicit, "natural": natural,
-            "ledger": options.ledger, "audited": options.ledger and _books_everything(system),
+            "ledger": self.nz > 0, "audited": self.nz > 0 and _books_everything(system),
             "frictional": system.frictional, "dry": np.count_nonzero(system.dry),
             "friction_code": friction_code() if system.frictional else 0,
             "instant_code": instant_code(),
@@ -285,10 +267,10 @@ class CompiledRun:
             counts=MappingProxyType(
                 {name: int(state[name]) for name in _COUNTERS}
                 | {"events": int(state["events"] + state["dropped"])}
-                | {name: int(state[name]) for name in ("redundant", "not_searched", *_NOTES) if state[name]}
+                | {name: int(state[name]) for name in ("redundant", "not_searched", *NOTES) if state[name]}
             ),
             ledger=Ledger(contact=ledger[:, :nc], input=ledger[:, nc], dissipated=ledger[:, nc + 1])
-            if self.nz
+            if self.options.ledger
             else None,
             determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
             unique_until=float(state["unique_until"]) if state["not_unique"] or state["unmet"] else np.inf,
@@ -327,9 +309,8 @@ class CompiledRun:
 
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
-            told = _NOTES | ({"indeterminate": _LOOPS_PRESS} if self.state["loops_press"][0] else {})
-            state = {name: self.state[name][0] for name in (*told, "energy_gained", "energy_handed")}
-            return " ".join(text.format(**state) for name, text in told.items() if state[name])
+            state = {name: self.state[name][0] for name in (*NOTES, *AMOUNTS)}
+            return noted(state, bool(self.state["loops_press"][0]))
         q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
         return f"{self._cause(outcome, q, v)}{where}. {outcome.advice}"

@@ -18,6 +18,8 @@ from crossbody.reference.sundials.friction_machine import FrictionMachine
 from crossbody.reference.sundials.level_machine import SAME_INSTANT, LevelMachine, View
 from crossbody.reference.sundials.run import CAUTION, SundialsRun
 from crossbody.reference.sundials.solvers import CVODE
+from crossbody.reference.sundials.touches import Touches
+from crossbody.reference.systems import absent
 
 APART, APART_PART = 1e-7, 1e-4  # of positions, and part of a slip without a direction: steps of differences
 RESOLVED = 64.0 * float(np.finfo(np.float64).eps)  # part of a velocity by which such a step differs from none
@@ -192,6 +194,8 @@ class FrictionRun(SundialsRun):
         """Back to the beginning."""
         self.tried, self.qd = 0, np.zeros(self.system.nq)
         super().start()
+        self.touches = Touches(self.friction.sliding.ways.keys() - self.friction.sliding.dry, self.options.rtol)
+        self.energy_start = float(self.equations.energy(self.q0, self.v0).sum())
 
     def _machine(self, e: Equations) -> LevelMachine:
         self.friction = FrictionMachine(self.system, e, self.options.rtol, self.options.tolerance, (self.q0, self.v0))
@@ -206,6 +210,28 @@ class FrictionRun(SundialsRun):
         if cautious:
             longest = min(longest, (self.options.t_end - self.state.t) * CAUTION**self.retries)
         return SlidingArc(self, self.state, longest)
+
+    def _settle(self, switched: bool) -> View:
+        view = super()._settle(switched)
+        self._follow_touches(view.lam)
+        return view
+
+    def _step(self, arc: Any, stop: float) -> bool | None:
+        switched = super()._step(arc, stop)
+        self._follow_touches(np.zeros(self.system.nc))  # touches begin where modes settle alone
+        return switched
+
+    def _follow_touches(self, lam: Floats) -> None:
+        """Follow what touches give out, by the energy account: none is kept, and nothing told, unless it is asked for.
+
+        Likewise of a system that does not say what its energy is.
+        """
+        if not self.scene.nz or self.system.energy is absent.energy:
+            return
+        s, e, nc = self.state, self.equations, self.system.nc
+        energy = e.energy(s.q, s.v)
+        error = float(energy.sum()) - self.energy_start - float(s.z[:nc].sum() + s.z[nc] - s.z[nc + 1])
+        self.touches.follow(self.machine.modes, e.gaps(s.t, s.q, s.v)[0], lam, s.z, energy, error)
 
     def _arc_on(self, arc: Any, view: View) -> Any:
         return self._arc(view) if arc.stiff else arc

@@ -23,6 +23,7 @@ from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
+from crossbody.reference.notes import noted
 from crossbody.reference.options import Options
 from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
 from crossbody.reference.sundials.compiled.evaluation import entry, linear_arc
@@ -32,6 +33,7 @@ from crossbody.reference.sundials.folds import Folds
 from crossbody.reference.sundials.frozen_machine import FrozenMachine
 from crossbody.reference.sundials.level_machine import LevelMachine, View
 from crossbody.reference.sundials.quiet import quiet
+from crossbody.reference.sundials.touches import Touches
 from crossbody.reference.systems import absent
 
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
@@ -93,6 +95,7 @@ class SundialsRun:
         self.retries = self.still = 0
         self.ended_rows: list[int] = []
         self.failed = ""  # what a controller in Python gave that is not finite
+        self.touches = Touches(set(), self.options.rtol)
         self.told = 0  # events of which the mechanism's `switch` knows
 
     def _machine(self, e: Equations) -> LevelMachine:
@@ -376,7 +379,9 @@ class SundialsRun:
                 {"rhs": self.scene.evaluations}
                 | ({"redundant": self.machine.redundant} if self.machine.redundant else {})
                 | self.machine.told
+                | self.touches.told
             ),
+            energy_gained=self.touches.gained,
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
         )  # fmt: skip
         if self.controller is not None:
@@ -386,7 +391,7 @@ class SundialsRun:
 
     def _message(self, outcome: Outcome) -> str:
         if outcome is Outcome.FINISHED:
-            return ""
+            return noted({**self.machine.told, **self.touches.told, **self.touches.amounts})
         s = self.state
         rows = f"Rows {self.ended_rows}, " if self.ended_rows else ""
         if outcome is Outcome.NOT_FINITE:
