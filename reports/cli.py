@@ -1,6 +1,6 @@
 """The command `crossbody`.
 
-Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2:
+Exit code 0: nothing is outside its limit (what is expected-outside, or not judged, does not count); 1: something is; 2:
 wrong use, reported in one sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130:
 interrupted. Whatever is not needed to read the command line is imported by the command that needs it.
 """

@@ -13,7 +13,17 @@ from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import called, label, style
-from crossbody.reports.judging.told import beyond, farthest, known_until, lacking, runs_of, sentence, share, telling
+from crossbody.reports.judging.told import (
+    NEXT,
+    beyond,
+    farthest,
+    known_until,
+    lacking,
+    runs_of,
+    sentence,
+    share,
+    telling,
+)
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.errors import farthest_off
@@ -60,7 +70,7 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     about, sources = _about(case.about)
     said = sentence(runs_of(rows)).replace(f" on {case.label}", "") if rows else ""
     return Page(
-        name=case.page, title=case.label, lead=f"{said} {at_rest([case])}".strip(),
+        name=case.page, title=case.label, lead=NEXT.join(filter(None, [said, at_rest([case])])),
         about=f"{about}{_compared(traces, rows)}", sources=sources,
         opening=sum(one.template == "playback.html" for one in moving),
         word=grid.verdict(rows),

@@ -13,7 +13,7 @@ import numpy as np
 from crossbody.cases import Trajectory, installed
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import look
-from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share, telling
+from crossbody.reports.judging.told import NEXT, WRONG, beyond, runs_of, sentence, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
@@ -91,12 +91,18 @@ def index_pages(found: Results) -> list[Page]:
         Page(
             name=name,
             title=_title(found) if i == 0 else f"Cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
-            lead=f"{sentence(runs_of(found.verdicts))} {at_rest(found.cases)}".strip() if found.verdicts else "",
+            lead=_lead(found),
             word=grid.verdict(found.verdicts),
             engines=[{"name": who, "shown": who, **look(who)} for who in found.engines],
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip
+
+
+def _lead(found: Results) -> str:
+    """What the verdicts come to, and where nothing moves."""
+    told = [sentence(runs_of(found.verdicts)), at_rest(found.cases)] if found.verdicts else []
+    return NEXT.join(filter(None, told))
 
 
 def _title(found: Results) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 from crossbody.cases import OutputError
 from crossbody.reports import sections as studies
 from crossbody.reports.figures.section import Section
-from crossbody.reports.judging.told import WRONG
+from crossbody.reports.judging.told import NEXT, WRONG
 from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
@@ -137,7 +137,9 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
             page = replace(page, title=title, sections=[*first, *page.sections])
             if led := [section.says for section in first if section.says]:
                 off = [page.lead] if any(row["verdict"] in WRONG for row in found.verdicts) else []
-                page = replace(page, lead=" ".join([*off, *led]), sections=[replace(s, says="") for s in page.sections])
+                page = replace(
+                    page, lead=NEXT.join([*off, *led]), sections=[replace(s, says="") for s in page.sections]
+                )
         yield page
     if not alone:
         yield from studied
