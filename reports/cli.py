@@ -108,7 +108,7 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     """Run cases on engines, judge them, and write the report."""
     if dry:
         words = ("names", "wanted", "variant", "pairs", "rtol", "settings", "out", "against", "others", "limit")
-        return _do("planned.tell", **{name: asked[name] for name in words})
+        return _do("planned.tell", **{name: asked[name] for name in (*words, "budget")})
     from crossbody.reports.runs import choice, output  # wrong words are reported before all else is imported
 
     given = choice.parse_settings(asked["pairs"])
