@@ -176,7 +176,7 @@ def stability(**asked: Any) -> int:
 
 
 @cli.command()
-@click.argument("names", metavar="[SUITE]...", nargs=-1, shell_complete=options.names_of("reports.suites"))
+@click.argument("names", metavar="[SUITE]...", nargs=-1, shell_complete=options.names_of("reports.suites", "cases"))
 @options.wanted
 @click.option("--runs", type=options.COUNT, metavar="N", help="Number of runs of the first engine, over all suites.")
 @click.option("--seed", type=options.Whole(0), default=0, show_default=True, metavar="N", help="Seed of all draws.")
@@ -199,7 +199,7 @@ def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) ->
 
     The pages map where each engine stays finite and accurate.
 
-    A SUITE may be your own case or a robot file, whose laws, pushes and parameters are then varied.
+    A SUITE may be a case or a robot file, whose laws, pushes and parameters are then varied.
     An interrupted sweep continues when the same command is repeated.
     """
     from crossbody.reports.commands.stress import Ask
