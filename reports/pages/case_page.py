@@ -25,6 +25,7 @@ from crossbody.reports.judging.told import (
     telling,
 )
 from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.layout import valid
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.errors import farthest_off
 from crossbody.reports.pages.friction import friction, hysteresis
@@ -60,6 +61,7 @@ PLAINLY = {
     Tier.D: "what the motion itself must keep, since no solution is known",
 }
 """What each kind of truth is, to a reader who has not read of them."""
+WHOLE = 100.0  # what a share, in per cent, is at best
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
 
 
@@ -157,7 +159,10 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": [row | {"beyond": beyond(row), "lacking": lacking(row), "times": _times(row)} for row in rows],
+            "rows": [
+                row | {"beyond": beyond(row), "lacking": lacking(row), "times": _times(row), "share": _share(row)}
+                for row in rows
+            ],
             "counts": _counted(rows), "causes": _causes(rows), "off": any(_off(row) for row in rows),
             "truths": _truths(case.about), "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
@@ -179,8 +184,13 @@ def _off(row: Row) -> bool:
 
 def _times(row: Row) -> str:
     """How many times its limit a number is, where it is beyond it."""
-    times = share(row)
+    times = math.inf if _share(row) else share(row)
     return f"{times:.2g}" if _off(row) and math.isfinite(times) else ""
+
+
+def _share(row: Row) -> str:
+    """What is valid of a share of the whole, whose limit is no size; nothing of other numbers."""
+    return valid(row["expected"], row["limit"]) if row["unit"] == "%" and row["expected"] == WHOLE else ""
 
 
 def _causes(rows: Sequence[Row]) -> list[dict[str, Any]]:

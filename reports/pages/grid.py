@@ -15,6 +15,7 @@ from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.html import BEYOND, number
+from crossbody.reports.replay.meanings import meaning
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
@@ -219,7 +220,7 @@ def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Se
 
 def _meaning(metric: str) -> str:
     """Say what a metric measures; nothing of those that a case brings along, and of parts of errors."""
-    return metrics.summary(metric) if metric in metrics.names() else ""
+    return metrics.summary(metric) if metric in metrics.names() else meaning(metric)
 
 
 def _urgent(row: Row) -> tuple[Any, ...]:

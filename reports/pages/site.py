@@ -130,12 +130,13 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     """Every page, made one after another; a folder without cases is led by its study."""
     studied = list(_studies(found))
     alone = studied if _leads(found) else []
+    first = [section for study in alone for section in study.sections]
+    led = [section.says for section in first if section.says]
     for page in index_pages(found):
         if page.name == INDEX:
             title = " · ".join(study.title for study in alone) if alone and not found.cases else page.title
-            first = [section for study in alone for section in study.sections]
             page = replace(page, title=title, sections=[*first, *page.sections])
-            if led := [section.says for section in first if section.says]:
+            if led:
                 off = [page.lead] if any(row["verdict"] in WRONG for row in found.verdicts) else []
                 page = replace(
                     page, lead=NEXT.join([*off, *led]), sections=[replace(s, says="") for s in page.sections]
@@ -144,7 +145,8 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     if not alone:
         yield from studied
     for case in found.cases:
-        yield case_page(found, case, share)
+        page = case_page(found, case, share)
+        yield replace(page, lead=NEXT.join(led)) if led else page
 
 
 def _leads(found: Results) -> bool:
