@@ -134,7 +134,7 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     led = [section.says for section in first if section.says]
     for page in index_pages(found):
         if page.name == INDEX:
-            title = " · ".join(study.title for study in alone) if alone and not found.cases else page.title
+            title = " · ".join(map(_called, alone)) if alone and not found.cases else page.title
             page = replace(page, title=title, sections=[*first, *page.sections])
             if led:
                 off = [page.lead] if any(row["verdict"] in WRONG for row in found.verdicts) else []
@@ -147,6 +147,11 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     for case in found.cases:
         page = case_page(found, case, share)
         yield replace(page, lead=NEXT.join(led)) if led else page
+
+
+def _called(study: Page) -> str:
+    """The title of a study, with the case where its first section names it."""
+    return next((one.title for one in study.sections if one.title.startswith(study.title)), study.title)
 
 
 def _leads(found: Results) -> bool:
