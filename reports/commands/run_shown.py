@@ -22,7 +22,10 @@ from crossbody.reports.runs.choice import DEFAULT_ENGINES
 MANY = 4  # cases that are named of those that an engine could not run
 SHOWN = {"position": "position", **{part: part_of("position", part) for part in PARTS}}
 """Errors in the table by their heads: the parts of the worst error of position add up to it."""
-RELATIVE = "Errors of position and their parts are relative to how far each coordinate moves, turns to a radian."
+RELATIVE = (
+    "Errors of position and their parts are relative to how far each coordinate moves, turns to a radian; touches are "
+    "laid on the truth's first where that brings motions nearer."
+)
 EXPECTED = Word.EXPECTED.replace("-", "-\n")
 """Head of the numbers that are outside as far as a known property explains, in two lines."""
 COUNTED: dict[str, Callable[[Row], bool]] = {

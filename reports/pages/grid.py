@@ -71,7 +71,8 @@ class Cell:
 class Line:
     """One line: its name, what stands beside it, the page that it leads to, a cell for every engine, and a sketch.
 
-    The sketch is a line of points in a box of 100 by 20, as SVG writes them. The title says what the line means.
+    The sketch is a line of points in a box of 100 by 20, as SVG writes them, of what `sketched` says. The title says
+    what the line means.
     """
 
     text: str
@@ -79,6 +80,7 @@ class Line:
     small: str = ""
     page: str = ""
     sketch: str = ""
+    sketched: str = ""
     title: str = ""
 
 

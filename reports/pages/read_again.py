@@ -33,6 +33,7 @@ _LINE = re.compile(r"<tr([^>]*)>(.*?)</tr>", re.DOTALL)
 _CELL = re.compile(r"<t[dh]\b([^>]*)>(.*?)</t[dh]>", re.DOTALL)
 _TILE = re.compile(r'<li class="[^"]*"><strong>(\d+)</strong> ([^<]*)</li>')
 _DATA = re.compile(r'data-(v|name|engine)="([^"]*)"')
+_SKETCHED = re.compile(r'<small class="sketched">.*?</small>')
 _TAGS = re.compile(r"<[^>]*>")
 _PLACE = re.compile(r" \(([^()]* by [^()]* at [^()]*)\)$")
 _OFF = re.compile(r"by (\S+ \S.*?) at ")
@@ -50,7 +51,7 @@ class Cell:
     @property
     def text(self) -> str:
         """What is shown."""
-        return " ".join(html.unescape(_TAGS.sub("", self.inner)).split())
+        return " ".join(html.unescape(_TAGS.sub("", _SKETCHED.sub("", self.inner))).split())
 
     @property
     def value(self) -> str:
