@@ -125,6 +125,8 @@ def _bench(out: Path) -> tuple[Section, ...]:
 def _conformance(out: Path) -> tuple[Section, ...]:
     if not _has(out, "conformance"):
         return ()
+    from crossbody.reports.importers.conformance import misread
+
     rows = _rows(out, "conformance")
     engines = list(dict.fromkeys(rows["engine"]))
     versions = {name: max(own["version"]) for name, own in rows.groupby("engine")}
@@ -139,7 +141,8 @@ def _conformance(out: Path) -> tuple[Section, ...]:
         Table(title="Features", columns=across, rows=[{name: "" for name in engines} | row for row in wide]),
     )
     title = STUDIES["conformance"].TITLE
-    return (Section(name="conformance", title=title, text=words.CONFORMANCE_TEXT, tables=tables),)
+    says = NEXT.join(misread(records(rows)))
+    return (Section(name="conformance", title=title, says=says, text=words.CONFORMANCE_TEXT, tables=tables),)
 
 
 def _gap_lines(out: Path) -> Table:
