@@ -69,7 +69,7 @@ class Engine(ABC):
             not named here it must show: the parity audit and the metrics count what is missing as wrong.
         orders: profile -> promised order of the error in its step `dt` or its tolerance `rtol`;
             the benchmark holds the observed one against it.
-        steps: profile whose known deviations hide what it applies -> theta: a step of its setting `dt` moves by
+        steps: profile whose numbers expected-outside hide what it applies -> theta: a step of its setting `dt` moves by
             dt (v + theta (v+ - v)); NaN without such steps, infinite where theta is a file's. Those that it takes
             first, accelerations, friction and the setting `restitution` are held against the law's
             (`crossbody.reports.judging.first_steps`).

@@ -64,25 +64,24 @@ def lying(kinds: tuple[str, str], sizes: tuple[Floats, Floats], at: Pose, by: Po
 
 
 def across(kind: str, one: Floats, two: Floats, normal: Floats) -> Floats:
-    """Return the two directions (2, 3) across a normal along which tangential rows are counted.
+    """Return the two directions (..., 2, 3) across normals along which tangential rows are counted.
 
     Over a plane they are its x and y; else Frisvad's frame of the normal in axes of the second
     shape that are turned so that no symmetry meets its pole (`crossbody.reference.tree.pair_slip`).
 
     Args:
         kind: type of the first shape.
-        one: its rotation (3, 3).
+        one: its rotation (..., 3, 3).
         two: that of the second shape.
-        normal: from the first shape to the second (3,).
+        normal: from the first shape to the second (..., 3).
     """
     if kind == "plane":
-        return np.asarray(one.T[:2])
-    X, Y, Z = TURNED @ two.T
-    a, b, c = normal @ X, normal @ Y, 1.0 + normal @ Z
-    return np.array([
-        (1.0 - a * a / c) * X - a * b / c * Y - a * Z,
-        -a * b / c * X + (1.0 - b * b / c) * Y - b * Z,
-    ])  # fmt: skip
+        return np.asarray(np.swapaxes(one, -1, -2)[..., :2, :])
+    turned = TURNED @ np.swapaxes(two, -1, -2)
+    X, Y, Z = (turned[..., k, :] for k in range(3))
+    a, b, c = _dot(normal, X)[..., None], _dot(normal, Y)[..., None], 1.0 + _dot(normal, Z)[..., None]
+    one_way = (1.0 - a * a / c) * X - a * b / c * Y - a * Z
+    return np.stack([one_way, -a * b / c * X + (1.0 - b * b / c) * Y - b * Z], axis=-2)
 
 
 def tilt(floor: Pose, at: Pose) -> Floats:

@@ -1,6 +1,6 @@
 """The command `crossbody`.
 
-Exit code 0: nothing is outside its limit (a known deviation counts as fine); 1: something is; 2:
+Exit code 0: nothing is outside its limit (what is expected-outside, or not judged, does not count); 1: something is; 2:
 wrong use, reported in one sentence on stderr; 3: a fault of crossbody, whose traceback is in a file; 130:
 interrupted. Whatever is not needed to read the command line is imported by the command that needs it.
 """
@@ -108,7 +108,7 @@ def run(dry: bool, jobs: int, **asked: Any) -> int:
     """Run cases on engines, judge them, and write the report."""
     if dry:
         words = ("names", "wanted", "variant", "pairs", "rtol", "settings", "out", "against", "others", "limit")
-        return _do("planned.tell", **{name: asked[name] for name in words})
+        return _do("planned.tell", **{name: asked[name] for name in (*words, "budget")})
     from crossbody.reports.runs import choice, output  # wrong words are reported before all else is imported
 
     given = choice.parse_settings(asked["pairs"])
@@ -176,7 +176,7 @@ def stability(**asked: Any) -> int:
 
 
 @cli.command()
-@click.argument("names", metavar="[SUITE]...", nargs=-1, shell_complete=options.names_of("reports.suites"))
+@click.argument("names", metavar="[SUITE]...", nargs=-1, shell_complete=options.names_of("reports.suites", "cases"))
 @options.wanted
 @click.option("--runs", type=options.COUNT, metavar="N", help="Number of runs of the first engine, over all suites.")
 @click.option("--seed", type=options.Whole(0), default=0, show_default=True, metavar="N", help="Seed of all draws.")
@@ -199,7 +199,7 @@ def stress(out: Path, tls_ca: str, tls_cert: str, tls_key: str, **asked: Any) ->
 
     The pages map where each engine stays finite and accurate.
 
-    A SUITE may be your own case or a robot file, whose laws, pushes and parameters are then varied.
+    A SUITE may be a case or a robot file, whose laws, pushes and parameters are then varied.
     An interrupted sweep continues when the same command is repeated.
     """
     from crossbody.reports.commands.stress import Ask

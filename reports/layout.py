@@ -59,7 +59,7 @@ def laid_out(
 
     Args:
         names: of the lines, which stay; cut where they take more than half the width and columns need the room.
-        cells: columns by their heads. Those that say nothing are left out.
+        cells: columns by their heads, of one line or two. Those that say nothing are left out.
         width: columns that no line exceeds.
         head: of the names.
         above: what stands above lines of the same, once; nothing where it is empty.
@@ -76,15 +76,19 @@ def laid_out(
             cells.pop(one, None)
     first = min(whole, max(width - _beside(cells), len(indent) + 1))
     lines = [_cut(line, first).ljust(first) for line in lines]
+    below = " " * first  # second lines of heads
     for one, column in cells.items():
         texts = _aligned(one, column)
         colour = (colours or {}).get(one)
         lines[0] += f"  {texts[0]}"
-        for i, text in enumerate(texts[1:]):
+        below += f"  {texts[1]}"
+        for i, text in enumerate(texts[2:]):
             lines[i + 1] += "  " + (click.style(text, fg=colour) if colour and column[i] != "0" else text)
     for i in reversed(range(len(above))):
         if i == 0 or above[i] != above[i - 1]:
             lines.insert(i + 1, click.style(_cut(above[i], width), bold=True))
+    if below.strip():
+        lines.insert(1, below)
     return "\n".join(line.rstrip() for line in lines)
 
 
@@ -148,7 +152,7 @@ def _cut(text: str, room: int) -> str:
 
 
 def _wide(head: str, column: Sequence[str]) -> int:
-    return max(map(len, (head, *column)))
+    return max(map(len, (*head.split("\n"), *column)))
 
 
 def _beside(cells: Mapping[str, Sequence[str]]) -> int:
@@ -156,10 +160,15 @@ def _beside(cells: Mapping[str, Sequence[str]]) -> int:
 
 
 def _aligned(head: str, column: Sequence[str]) -> list[str]:
-    """The head and the cells of a column in one width: words begin at the left, numbers end at the right."""
+    """Both lines of a head and the cells of a column in one width: words at the left, numbers at the right."""
     words = any(cell[:1].isalpha() and cell not in ("nan", "inf") for cell in column)
     wide = _wide(head, column)
-    return [text.ljust(wide) if words else text.rjust(wide) for text in (head, *column)]
+    return [text.ljust(wide) if words else text.rjust(wide) for text in (*_two_lines(head), *column)]
+
+
+def _two_lines(head: str) -> tuple[str, str]:
+    first, _, second = head.partition("\n")
+    return first, second
 
 
 def bounded(value: float | None, known: float | None) -> tuple[str, float]:

@@ -87,6 +87,8 @@ class Fit:
         outcome: "converged"; "unconverged" where the search ended before that, with intervals about where
             it ended; or "stopped" at the time limit: the best so far, without intervals and errors.
         message: of the search.
+        left: of every fitted window its times (m,), s, and what the fit leaves in it (m, k): measured less
+            predicted, from the start that was fitted. The intervals come from these.
         profile: parameter -> values about its estimate, and the cost at each over that at the estimate.
     """
 
@@ -108,6 +110,7 @@ class Fit:
     evaluations: int
     outcome: str
     message: str
+    left: tuple[tuple[Floats, Floats], ...] = ()
     profile: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
 
     @property

@@ -88,12 +88,21 @@ def judged(search: Search) -> Fit:
         fitted=search.fitted, held=search.held, before=before, after=after,
         sensitivities=f"{problem.how}; central differences at the solution differ by {off:.1e} of their size",
         covariance=spread.how, warnings=(), evaluations=found.evaluations,
-        outcome=CONVERGED if found.success else UNCONVERGED, message=found.message,
+        outcome=CONVERGED if found.success else UNCONVERGED, message=found.message, left=_left(problem, found.residual),
         profile={free[i]: one for i, one in risen.items()},
     )  # fmt: skip
     about = [] if problem.starts else [MEASURED.format(COUNTED if isinstance(problem, Exact) else NEVER)]
     warnings = (*_warnings(fit, unseen, found, flat, off, problem.tolerance), *about)
     return replace(fit, warnings=warnings)
+
+
+def _left(problem: Any, residual: Floats) -> tuple[tuple[Floats, Floats], ...]:
+    """Times (m,) and residuals (m, k) of every fitted window."""
+    owners = problem.layout.windows()
+    return tuple(
+        (window.t[at], residual[owners == j].reshape(problem.k, -1).T)
+        for j, (window, at) in enumerate(zip(problem.cut, problem.grids, strict=True))
+    )
 
 
 def unjudged(search: Search, seconds: float) -> Fit:

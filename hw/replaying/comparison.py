@@ -210,7 +210,7 @@ class Comparison:
         for metric, value, unit in self._impacts(prediction):
             yield row(metric, value, unit, self.coordinates[self.falls].name)
         yield row("windows_failed", float(prediction.failed), "1")
-        yield row("speed", sum(w.segment.t_end for w in self.windows) / max(prediction.wall_s, 1e-12), "1")
+        yield row("speed", sum(w.segment.t_end for w in self.windows) / max(prediction.wall_s, 1e-12), "s/s")
 
     def _impacts(self, prediction: Prediction) -> Iterator[tuple[str, float, str]]:
         """How far impacts are from the measured ones: in number, in time, and in impulse over all of them."""

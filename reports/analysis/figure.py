@@ -8,22 +8,44 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from crossbody.cases.arrays import Floats
 from crossbody.reports.analysis.bode import OUTPUTS, UNITS
 from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES, LEVEL, Panels
 
 MARKS = ("x", "circle-open", "square-open", "diamond-open", "triangle-up-open")
+SAME = 1e-9  # part of the largest pole by which two at one point may differ
 USUAL = 0.98  # part of a map that its colours tell apart: beside a singular pose growth has no bound
 RESPONDING = 1e-12  # part of the largest magnitude below which a response is none
 
 
 def pole_figure(rows: pd.DataFrame) -> Figure:
-    """Poles of every place in the complex plane; those of several at one point are marks around each other."""
+    """Poles of every place in the complex plane; those of several at one point are marks around each other.
+
+    How many lie at one point is written beside it.
+    """
     plane = _plane("Poles of the linear models")
     for i, (place, group) in enumerate(rows.groupby("place", sort=False)):
         marker = {"symbol": MARKS[i % len(MARKS)], "size": 8 + 3 * i, "color": COLOURS[i % len(COLOURS)]}
         plane.add(x=group["real"], y=group["imag"], name=str(place), mode="markers", marker=marker)
+    points = _together(rows["real"].to_numpy(float), rows["imag"].to_numpy(float))
+    several = {point: count for point, count in points.items() if count > 1}
+    if several:
+        plane.add(
+            x=[point[0] for point in several], y=[point[1] for point in several], mode="text", showlegend=False,
+            text=[f"{count} poles" for count in several.values()], textposition="top right", hoverinfo="skip",
+        )  # fmt: skip
     return plane.figure(shapes=AXIS)
+
+
+def _together(x: Floats, y: Floats) -> dict[tuple[float, float], int]:
+    """Return points, and how many of those given lie at each, to a part SAME of the largest."""
+    size = SAME * max(float(np.max(np.hypot(x, y), initial=0.0)), 1e-300)
+    found: dict[tuple[float, float], int] = {}
+    for one in zip(x.tolist(), y.tolist(), strict=True):
+        near = next((point for point in found if np.hypot(point[0] - one[0], point[1] - one[1]) <= size), one)
+        found[near] = found.get(near, 0) + 1
+    return found
 
 
 def locus_figure(rows: pd.DataFrame, limits: pd.DataFrame | None = None) -> Figure:

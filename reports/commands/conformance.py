@@ -15,8 +15,9 @@ from crossbody.cases.files.conformance import FEATURES
 from crossbody.engines import importers
 from crossbody.reports import layout, voice
 from crossbody.reports.commands.shared import publish, where
+from crossbody.reports.figures.section import records
 from crossbody.reports.importers.compare import FAILED, OK, UNSEEN, UNSUPPORTED, WRONG
-from crossbody.reports.importers.conformance import table
+from crossbody.reports.importers.conformance import misread, table
 from crossbody.reports.runs import output
 from crossbody.reports.runs.provenance import provenance
 
@@ -52,6 +53,7 @@ def conformance(engines: Sequence[str], part: str, seconds: float, out: Path, co
 
 def _show(rows: pd.DataFrame, absent: dict[str, str], out: Path) -> None:
     if not voice.quiet():
+        print("\n".join(map(layout.told, misread(records(rows)))) + "\n")
         for engine, own in rows.groupby("engine", sort=False):
             counts, version = Counter(own["verdict"]), max(own["version"])
             told = ", ".join(

@@ -100,6 +100,20 @@ def parameters_of(context: click.Context, _parameter: click.Parameter, begun: st
     return [CompletionItem(f"{name}=", help=doc) for name, doc in found.items() if name.startswith(begun)]
 
 
+def law_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Return what a shell completes to constants of the law of rows, behind those that are given."""
+    given, comma, last = begun.rpartition(",")
+    return [
+        CompletionItem(f"{given}{comma}{name}=")
+        for name in LAW if name.startswith(last) and f"{name}=" not in given
+    ]  # fmt: skip
+
+
+def files_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Let a shell complete the name of a file."""
+    return [CompletionItem(begun, type="file")]
+
+
 def settings_of(context: click.Context, _parameter: click.Parameter, begun: str) -> list[CompletionItem]:
     """Return what a shell completes to settings of the engines that are asked for, or of those that are installed."""
     from crossbody import cases, engines
@@ -116,6 +130,10 @@ def settings_of(context: click.Context, _parameter: click.Parameter, begun: str)
                 with suppress(cases.CaseUnsupported):
                     found |= {f"{name}.{key}=": one.doc for key, one in engine.offered(case, each).items()}
     return [CompletionItem(name, help=doc) for name, doc in found.items() if name.startswith(begun)]
+
+
+LAW = ("a0", "a1", "a2")
+"""Constants of the law of rows."""
 
 
 class _Number(click.types.FloatParamType):
@@ -226,8 +244,10 @@ def parameters(command: _Work) -> _Work:
         click.option("--set", "pairs", metavar="K=V", multiple=True, help="Parameter of the case; repeatable.",
                      shell_complete=parameters_of),
         click.option("--t-end", type=NUMBER, metavar="S", help="Horizon, s; same as --set t_end=S."),
-        click.option("--law", metavar="a0=,a1=", help="Constants of all rows; same as --set for each constant."),
-        click.option("--ctrl", metavar="FILE", help="Robot file: table of controls (CSV, Parquet, NPZ)."),
+        click.option("--law", metavar="a0=,a1=", help="Constants of all rows; same as --set for each constant.",
+                     shell_complete=law_of),
+        click.option("--ctrl", metavar="FILE", help="Robot file: table of controls (CSV, Parquet, NPZ).",
+                     shell_complete=files_of),
         click.option(
             "--control", metavar="FILE.py:NAME",
             help="Robot file: your own callable (t, q, v) -> u, or a class of such callables.",

@@ -14,11 +14,13 @@ from crossbody.cases import Case, CaseUnsupported, Value
 from crossbody.cases.errors import several
 from crossbody.cases.files.case import PARAMETERS
 from crossbody.reports import layout, voice
+from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.stored import words
 from crossbody.reports.pages import results
 from crossbody.reports.runs import choice, output
 
 Named = Mapping[str, str]
+AGAIN = "not run again where it is the witness of the truth"
 RUBS = "if its motion comes to a contact with friction"
 """When the rows of a file's contacts are run: the motion tells, which a plan does not follow."""
 
@@ -41,18 +43,18 @@ def check_settings(
 ) -> None:
     """Check the settings of engines, if any are asked for, as these would be prepared: before the first case is run."""
     for case in cases if asked else ():
-        _planned(case, picks, asked, rtol)
+        _planned(case, picks, asked, rtol, BUDGET)
 
 
 def tell(
     names: Sequence[str], wanted: Sequence[str], variant: str | None, pairs: Sequence[str], rtol: float | None,
-    settings: Sequence[str], out: Path, against: Path | None, others: Sequence[Path], limit: float,
+    settings: Sequence[str], out: Path, against: Path | None, others: Sequence[Path], limit: float, budget: float,
 ) -> int:  # fmt: skip
     """Print what `run` would do with the same words; the exit code."""
     cases = choice.load_cases(names, variant, choice.parse_settings(pairs), limit)
     picks, asked = checked(wanted, rtol, settings, out, against, others)
     each = [(case, condition) for one in cases for case, condition in _conditions(one)]
-    found = [(case, condition, _planned(case, picks, asked, rtol)) for case, condition in each]
+    found = [(case, condition, _planned(case, picks, asked, rtol, budget)) for case, condition in each]
     if voice.as_json():
         voice.result(json.dumps([_plain_plan(*one) for one in found], default=str))
         return 0
@@ -63,6 +65,8 @@ def tell(
         mine = {
             f"{engine}:{profile}": told if isinstance(told, str) else words(told) for engine, profile, told in known
         }
+        bounded = {f"{pick.engine}:{pick.profile}" for pick in picks if choice.bounded(case, pick)}
+        mine |= {who: f"{mine[who]}; {AGAIN}" for who in bounded & {choice.CVODE} if "skipped" not in mine[who]}
         label, parameters, runs = firsts.get((case.name, condition), ("", {}, {}))
         for line in (_parameter_line(_parameters(case), parameters, label), *_engine_lines(mine, runs, label)):
             click.echo(layout.told(f"  {line}".rstrip()))
@@ -123,7 +127,7 @@ def _finite(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _planned(
-    case: Case, picks: Sequence[choice.Pick], asked: Mapping[str, Value], rtol: float | None
+    case: Case, picks: Sequence[choice.Pick], asked: Mapping[str, Value], rtol: float | None, budget: float
 ) -> list[tuple[str, str, Mapping[str, Any] | str]]:
     """Return each engine and profile with its settings, or with why it would not run."""
     given = dict(asked) | ({} if rtol is None else {"rtol": rtol})
@@ -131,19 +135,19 @@ def _planned(
     offers = [(pick, choice.offered(case, pick)) for pick in own if asked and not pick.skipped]
     able = [(pick.engine, pick.profile, offered) for pick, offered in offers if offered is not None]
     choice.check_known(asked, able)  # first: a name that nobody knows is told without preparing anybody's run
-    return [(pick.engine, pick.profile, _settings(case, pick, given)) for pick in own]
+    return [(pick.engine, pick.profile, _settings(case, pick, given, budget)) for pick in own]
 
 
 def _plain(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value) or '""'
 
 
-def _settings(case: Case, pick: choice.Pick, asked: Mapping[str, Value]) -> Mapping[str, Any] | str:
+def _settings(case: Case, pick: choice.Pick, asked: Mapping[str, Value], budget: float) -> Mapping[str, Any] | str:
     """What an engine would be run with, or why it would not be."""
     if pick.skipped:
         return f"skipped: {pick.skipped}"
     try:
-        engine, own = engines.load(pick.engine), choice.of_pick(asked, pick)
+        engine, own = engines.load(pick.engine), choice.with_bound(case, pick, choice.of_pick(asked, pick), budget)
         offered = engine.offered(case, pick.profile) if own else {}
         return engine.planned(case, pick.profile, **{key: value for key, value in own.items() if key in offered})
     except CaseUnsupported as error:

@@ -43,6 +43,7 @@ SPARED = (
     "start",
     "identifiable",
     "fitted_before",
+    "unit",
 )
 """Columns that go first where a table is too wide."""
 
@@ -156,6 +157,8 @@ def run_identify(
     )  # fmt: skip
     watch.unlimited()
     tables = {"identify": estimates(fit), "held_out": held_out(fit)}
+    units = [row.unit for row in found.rows() if row.metric == "rmse"]
+    tables["held_out"]["unit"] = identified.one_unit(units)
     told = {
         "sensitivities": fit.sensitivities, "covariance": fit.covariance, "warnings": list(fit.warnings),
         "fitted": list(fit.fitted), "held": list(fit.held), "message": fit.message, "outcome": fit.outcome,
@@ -163,7 +166,11 @@ def run_identify(
     comparison.check(asked, found, (comparison.HELD,))
     rows = replay.verdicts(found, command, asked, fit)
     tables["held_out"]["verdict"] = _held_verdicts(fit, rows)
-    drawn = {"identify-profile": replay.profile(fit), "identify-correlation": replay.correlation(fit)}
+    drawn = {
+        "identify-profile": replay.profile(fit), "identify-correlation": replay.correlation(fit),
+        "identify-residuals": replay.left_by_fit(fit, found),
+        "identify-autocorrelation": replay.correlations_of_fit(fit, found),
+    }  # fmt: skip
     _write(out, found, rows, provenance(command, log=replay.log_about(found), fit=told), tables | drawn, "identify")
     more = {"warnings": pd.DataFrame({"text": list(fit.warnings)}), "metrics": _metrics(found, rows)}
     if not voice.told_as_json(tables | more):

@@ -15,7 +15,7 @@ from crossbody.engines.equations import answering, equations_of, has_equations
 from crossbody.reference.compiling import count
 from crossbody.reports import layout, voice
 from crossbody.reports.commands import planned, repeated
-from crossbody.reports.commands.run_shown import counted, show, show_time, show_unselected
+from crossbody.reports.commands.run_shown import counted, show, show_code, show_time, show_unselected
 from crossbody.reports.commands.shared import identity, key, where
 from crossbody.reports.judging import known
 from crossbody.reports.judging.audit import SEED
@@ -102,9 +102,12 @@ def run(
             click.echo(layout.told(line))
         show_unselected(wanted)
         show_time([*clock, perf_counter()], times, count.seconds - compiled)
-    where(out)
     lost_numbers = (row["regression"] for row in rows) if strict else ()
-    return max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
+    code = max(lost, exit_code((row["verdict"] for row in rows), lost_numbers))
+    if not voice.silent():
+        show_code(rows, code)
+    where(out)
+    return code
 
 
 def changed(now: Sequence[Row], before: Sequence[Row], name: Path) -> list[str]:

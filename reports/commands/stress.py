@@ -20,7 +20,7 @@ from crossbody.reports.runs import choice, watch
 from crossbody.reports.runs.provenance import provenance
 from crossbody.reports.suites.contract import Suite
 from crossbody.reports.sweep import draw, pools
-from crossbody.reports.sweep.map import in_words, stability_map, summary
+from crossbody.reports.sweep.map import ERROR, in_words, stability_map, summary, unrun, varied
 from crossbody.reports.sweep.minimise import reproducers
 from crossbody.reports.sweep.spec import Spec
 from crossbody.reports.sweep.store import STRESS, SWEEP, Store, identity
@@ -134,7 +134,10 @@ def _show(rows: pd.DataFrame, small: pd.DataFrame, out: Path) -> None:
     """One line a suite and engine, the reproducers, and where the page is."""
     if not voice.quiet():
         click.echo(layout.told(in_words(rows)))
+        click.echo("\n".join(map(layout.told, varied(rows))))
     print_rows(summary(rows), digits=2, above="suite", left_out=("with_truth", "not_run", "worst_residual"))
+    if not voice.quiet():
+        click.echo("\n".join(map(layout.told, [ERROR, *unrun(rows)])))
     for line in small.head(SHOWN).to_dict(orient="records"):
         click.echo(f"{line['verdict']}: {line['outcome']} ({line['count']}x): {line['command']}")
         click.echo(layout.told(f"    {line['why'][:300]}"))

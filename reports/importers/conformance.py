@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +19,7 @@ from crossbody.reports.importers.declared import excused
 from crossbody.reports.importers.forms import Forms
 
 PART = 16  # features that one process of an importer is asked at least
+NAMED = 6  # features that are named of each engine
 WORST = (FAILED, WRONG, UNSUPPORTED, UNSEEN, OK, NONE)
 
 
@@ -70,6 +71,25 @@ def _told(feature: Feature, engine: str, audit: Audit, answer: dict[str, Any]) -
     about = [row for row in about if (row.quantity, row.verdict) != ("energy", UNSEEN)]  # it follows from the others
     worst = min(about, key=lambda row: WORST.index(row.verdict))
     return replace(worst, version=answer.get("version", ""), cause=feature.name)
+
+
+def misread(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Say how many features all readers read as the format says, and which ones each reads otherwise, a line each.
+
+    Args:
+        rows: of each feature and engine, with its verdict.
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if row["verdict"] in WORST[:2]:
+            found.setdefault((row["engine"], row["verdict"]), []).append(row["feature"])
+    every = list(dict.fromkeys(row["feature"] for row in rows))
+    off = {row["feature"] for row in rows if row["verdict"] not in (OK, NONE)}
+    told = [f"{len(every) - len(off)} of {len(every)} features are read by all engines as the format says."]
+    for (engine, word), names in found.items():
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        told.append(f"{engine} {word}: {', '.join(names[:NAMED])}{more}.")
+    return told
 
 
 def table(

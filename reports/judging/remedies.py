@@ -21,14 +21,13 @@ DOES = {
 """What makes each part smaller, but for the step, whose setting depends on the run."""
 
 
-def remedy(who: str, rows: Sequence[Row], metric: str, label: str) -> str:
+def remedy(who: str, rows: Sequence[Row], metric: str) -> str:
     """Say which part of a run's error is how large, and what makes it smaller; nothing where no step is known.
 
     Args:
         who: engine:profile.
         rows: of that run.
         metric: of which error.
-        label: of the case.
     """
     own = {row["metric"]: row for row in rows}
     step = _shorter(who, own[metric]) if metric in own else ""
@@ -38,11 +37,11 @@ def remedy(who: str, rows: Sequence[Row], metric: str, label: str) -> str:
     shares = {part: _number(row["value"]) / abs(own[metric]["value"]) for part, row in parts.items()}
     if not all(map(math.isfinite, shares.values())):
         test = f"if {step} makes it smaller, it is the step's"
-        return f"What is model and what step in the error of {metric} of {who} on {label} is not known: {test}."
+        return f"What is model and what step is not known: {test}"
     most = max(shares, key=lambda part: abs(shares[part]))
     does = DOES.get(most, f"{step} makes it smaller{_at_best(own, metric)}")
     told = ", ".join(_told(parts, shares, own[metric]))
-    return f"Parts of the error of {metric} of {who} on {label}: {told}; {does}."
+    return f"Its parts: {told}; {does}"
 
 
 def _at_best(own: Mapping[str, Row], metric: str) -> str:

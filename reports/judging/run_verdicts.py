@@ -395,11 +395,11 @@ def _measured(judge_: Judge, run: Trajectory, truth: Truth) -> Iterator[Verdict]
 
 
 TIMES = 5.0
-"""How many times as large, and as small, a known deviation must not be."""
+"""How many times as large, and as small, a number expected-outside must not be."""
 
 
 def _unbounded(judge_: Judge, found: Verdict) -> Iterator[Verdict]:
-    """Say that a known deviation passes in any size, where its size is that of a stored run."""
+    """Say that what is expected-outside passes in any size, where its size is that of a stored run."""
     limit, claim, stored = judge_.limit(found.metric), judge_.claims.get(found.metric), judge_.stored.get(found.metric)
     if found.verdict != Word.EXPECTED or stored is None or limit is None or limit.known_least > 0.0 or judge_.hides():
         return
@@ -408,7 +408,7 @@ def _unbounded(judge_: Judge, found: Verdict) -> Iterator[Verdict]:
         value = expected + times * deviation(found.value, claim)
         row = judge_.judged(found.metric, value, found.unit, judge_.truth, found.compared)
         if row.verdict != Word.OUTSIDE and deviation(value, claim) > limit.value:
-            why = f"A control passes: {times:g} times the known deviation is no number outside."
+            why = f"A control passes: {times:g} times what is expected-outside is no number outside."
             yield replace(row, metric=f"{found.metric} (control)", verdict=Word.OUTSIDE, why=why)
 
 

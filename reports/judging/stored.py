@@ -1,4 +1,4 @@
-"""What a run of this version gave: the size of every known deviation, and the band in which numbers stay.
+"""What a run of this version gave: the size of what is expected-outside, and the band in which numbers stay.
 
 `stored.json` beside this file is made by one command (`make bands`) and committed; it holds the
 deviation of every number from what is claimed, by case and variant, engine and profile, to three digits.

@@ -23,6 +23,7 @@ _CLAUSE = re.compile(r"[:;.](?:\s|$)")
 _WHERE = re.compile(r"\bby (\S+) (\S.*?) at ")
 """How far a coordinate is off, and its unit, as a number of position says it."""
 NAMED = 3  # runs that the sentence names
+NEXT = "\n- "  # begins each line of a sentence but the first
 QUANTITIES = frozenset(
     {
         "position", "angle_error", "velocity", "lam_error", "lam_impulse", "lam_impulse_path", "collision_impulse",
@@ -87,6 +88,10 @@ class EngineRun:
         return all(row["verdict"] == Word.SKIPPED for row in self.rows)
 
 
+Deviating = Sequence[tuple[EngineRun, Row]]
+"""Runs, each with the number that is named of it."""
+
+
 def runs_of(rows: Iterable[Row]) -> list[EngineRun]:
     """Rows by case and engine, in their order."""
     found: dict[tuple[str, str], list[Row]] = {}
@@ -136,7 +141,10 @@ def telling(row: Row) -> tuple[Any, ...]:
 
 
 def sentence(runs: Sequence[EngineRun]) -> str:
-    """Say how many runs are within all limits, which have known deviations, and which are off and why."""
+    """Say how many runs are within all limits, expected-outside, beyond a limit and outside; then a line a run why.
+
+    The lines behind the first begin with a dash.
+    """
     all_ran = [run for run in runs if not run.who.startswith(TRUTH) and not run.skipped]
     ran = [run for run in all_ran if run.judged]
     if not all_ran and not any(run.wrong for run in runs):
@@ -145,28 +153,52 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         return "Nothing is judged, since no number has a limit."
     off = sorted((run for run in runs if run.wrong), key=lambda run: (run.failed is None, farthest(run.wrong[0])))
     right = [run for run in ran if not run.wrong]
-    loose = [(run, row) for run in right if (row := run.unbounded)]
+    loose = sorted(((run, row) for run in right if (row := run.unbounded)), key=lambda one: -share(one[1]))
     known = [(run, row) for run in right if not run.unbounded and (row := run.deviates)]
-    text = _counted(len(right) - len(known) - len(loose), len(ran), [run.who for run, _ in known], bool(off))
-    if known:
-        most = _largest(known)
-        metric = most[0][1]["metric"]
-        head = f"deviation of {metric}" if len(most) == 1 else f"deviations of {metric}, by unit"
-        text += f" The largest {head}: {'; '.join(_caused(most))}."
-    if len(ran) < len(all_ran):
-        text += f" Without a limit: {_named([f'{run.who} on {run.label}' for run in all_ran if not run.judged])}."
-    for said, of_truth in (("Off", False), ("In doubt", True)):
-        some = [_off(run, run.first) for run in off if run.who.startswith(TRUTH) == of_truth]
-        text += f" {said}: {_named(some)}." if some else ""
-    if loose:
-        loose.sort(key=lambda one: -share(one[1]))
-        text += f" Beyond a limit for a known cause, and not judged: {_named(_caused(loose))}."
-        does = (remedy(run.who, run.rows, row["metric"], run.label) for run, row in loose[:NAMED])
-        text += "".join(f" {one}" for one in dict.fromkeys(does) if one)
-    return f"{text}{_known_until(runs)}"
+    count = _counted(len(ran), known, loose, sum(not run.who.startswith(TRUTH) for run in off))
+    lines = [count + _known_until(runs)]
+    for said, of_truth in (("Outside", False), ("In doubt", True)):
+        lines += _listed(said, [_off(run, run.first) for run in off if run.who.startswith(TRUTH) == of_truth])
+    remedies = [remedy(run.who, run.rows, row["metric"]) for run, row in loose]
+    told = (f"{one}. {does}" if does else one for one, does in zip(_caused(loose), remedies, strict=True))
+    lines += _listed("Beyond a limit, not judged", list(told))
+    lines += _listed("Expected-outside, the largest", _caused(_largest(known)) if known else [])
+    lines += _listed("Without a limit", [f"{run.who} on {run.label}" for run in all_ran if not run.judged])
+    return NEXT.join(lines)
 
 
-def _largest(known: Sequence[tuple[EngineRun, Row]]) -> list[tuple[EngineRun, Row]]:
+def _counted(ran: int, known: Deviating, loose: Deviating, off: int) -> str:
+    """How many of the runs are within all limits, expected-outside, beyond a limit and outside."""
+    whom = ", ".join(dict.fromkeys(run.who for run, _ in known))
+    counts = {
+        "within all limits": ran - len(known) - len(loose) - off,
+        f"{Word.EXPECTED} ({'; '.join([whom, *_up_to(known)])})": len(known),
+        f"beyond a limit and not judged ({'; '.join(_up_to(loose))})": len(loose),
+        "outside": off,
+    }
+    if ran == 1:
+        return f"The run is {next(said for said, count in counts.items() if count)}."
+    (head, first), *rest = counts.items()
+    more = "".join(f", {count} {_are(count)} {said}" for said, count in rest if count)
+    return f"{first} of {ran} runs {_are(first)} {head}{more}."
+
+
+def _are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
+def _up_to(some: Deviating) -> list[str]:
+    """Say which number that runs are named for is how many times its limit, at most; nothing where none has one."""
+    found = max(((share(row), row["metric"]) for _, row in some if math.isfinite(share(row))), default=None)
+    return [f"{found[1]} up to {found[0]:.2g} times its limit"] if found else []
+
+
+def _listed(head: str, texts: Sequence[str]) -> list[str]:
+    """One line for each of the first texts, and one for how many more there are."""
+    return [f"{head}: {text}." for text in _first(texts)]
+
+
+def _largest(known: Deviating) -> list[tuple[EngineRun, Row]]:
     """Return the number that tells most; of positions the largest of each unit, as no metre is part of a radian."""
     first = min(known, key=lambda one: telling(one[1]))
     found: dict[str, tuple[float, tuple[EngineRun, Row]]] = {}
@@ -180,7 +212,7 @@ def _largest(known: Sequence[tuple[EngineRun, Row]]) -> list[tuple[EngineRun, Ro
 def _known_until(runs: Sequence[EngineRun]) -> str:
     """Say which cases are compared in part only, since the truth is known no further; nothing if none is."""
     short = [f"{run.label}, {_part(row)}" for run in runs for row in run.rows if is_short(row)]
-    return f" Compared up to the time to which the truth is known: {_named(short)}." if short else ""
+    return f" Compared up to the time to which the truth is known: {'; '.join(_first(short))}." if short else ""
 
 
 def is_short(row: Row) -> bool:
@@ -199,23 +231,6 @@ def known_until(rows: Iterable[Row], end: float) -> tuple[float, str]:
     return min(found, default=(end, ""))
 
 
-def _counted(within: int, ran: int, known: Sequence[str], off: bool) -> str:
-    """How many of the runs are within all limits, which deviate as expected, and that none is outside."""
-    if ran == 1 and not off and not within and not known:
-        return "No number of the run is outside."
-    if ran == 1:
-        text = f"The run {'is' if within else 'is not'} within all limits"
-    else:
-        text = f"{within} of {ran} runs {'is' if within == 1 else 'are'} within all limits"
-    none = "" if off or within + len(known) == ran else ", none is outside"
-    if not known:
-        return f"{text}{none}."
-    whom = ", ".join(dict.fromkeys(known))
-    if ran == 1:
-        return f"The run deviates as expected ({whom})."
-    return f"{text}, {len(known)} {'deviates' if len(known) == 1 else 'deviate'} as expected ({whom}){none}."
-
-
 def _part(row: Row) -> str:
     until, why = _short(row)
     part = f"{row['compared']:.2g} of the horizon"
@@ -228,9 +243,10 @@ def _short(row: Row) -> tuple[str, str]:
     return (said[1], said[2]) if said else ("", "")
 
 
-def _named(texts: Sequence[str]) -> str:
-    more = f"; and {len(texts) - NAMED} more" if len(texts) > NAMED else ""
-    return "; ".join(texts[:NAMED]) + more
+def _first(texts: Sequence[str]) -> list[str]:
+    """The first texts, and how many more there are."""
+    more = [f"and {len(texts) - NAMED} more"] if len(texts) > NAMED else []
+    return [*texts[:NAMED], *more]
 
 
 def _off(run: EngineRun, row: Row) -> str:
@@ -247,12 +263,12 @@ def _off(run: EngineRun, row: Row) -> str:
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
 
 
-def _caused(some: Sequence[tuple[EngineRun, Row]]) -> list[str]:
-    """Numbers beyond their limits; behind the last of those that are named with one cause, its first statement."""
+def _caused(some: Deviating) -> list[str]:
+    """Numbers beyond their limits; behind the first of those with one cause its first statement."""
     causes = [_CLAUSE.split(row["why"].removeprefix(UNMEASURED))[0] for _, row in some]
     return [
-        _off(run, row) + (f": {cause[:1].upper()}{cause[1:]}" if cause and (k == NAMED or cause != after) else "")
-        for k, ((run, row), cause, after) in enumerate(zip(some, causes, [*causes[1:], ""], strict=True), 1)
+        _off(run, row) + (f": {cause[:1].upper()}{cause[1:]}" if cause and cause != before else "")
+        for (run, row), cause, before in zip(some, causes, ["", *causes], strict=False)
     ]
 
 

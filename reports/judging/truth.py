@@ -134,7 +134,9 @@ def _integrated(case: Case, first: Trajectory, other: str, budget: float = BUDGE
     )  # fmt: skip
     second = _second(case, truth, other, budget)
     t, grown = _growing(case, dense, budget)
-    truth = held_against(replace(truth, tier=second.tier, grows=float(grown[-1])), second.run, case, second.rtol)
+    witness = ("reference", second.name) if second.name == other else ("", "")
+    known = replace(truth, tier=second.tier, grows=float(grown[-1]), witness=witness)
+    truth = held_against(known, second.run, case, second.rtol)
     if (horizon := _horizon(case, truth, second.run, t, grown)) is not None:
         known = replace(truth, horizon=horizon, grows=float(np.interp(horizon.until, t, grown)))
         truth = held_against(known, second.run, replace(case, chaos=horizon), second.rtol)

@@ -156,7 +156,7 @@ def judge(
     """The word and the reason for one number.
 
     A claim without a limit must come out exactly. What is not finite is outside, even where
-    nothing is judged; so is a known deviation that is no more there: whatever took it away may
+    nothing is judged; so is what is no more expected-outside: whatever took it away may
     be in what measures it.
 
     Args:
@@ -230,7 +230,7 @@ def regression(value: float, most: float, stored: float | None, factor: float) -
 
 
 def exit_code(words: Iterable[str], regressions: Iterable[str] = ()) -> int:
-    """0 if nothing is outside or crashed (a known deviation counts as fine) and nothing is lost, else 1."""
+    """0 if nothing is outside or crashed (what is expected-outside does not count) and nothing is lost, else 1."""
     return int(any(word in (Word.OUTSIDE, Word.CRASHED) for word in words) or Regression.LOST in set(regressions))
 
 

@@ -43,6 +43,7 @@ class Truth:
         grows: how many times more than in free flight an error of the start grows; 1 where it was
             not measured.
         tight: tolerance of the compiled run; NaN of another source.
+        witness: engine and profile that it is held against; empty where that is no engine's own.
         firm: until when slips are fast enough to tell the direction of their friction, s.
         part: of the horizon that was asked for, up to which the motion is followed.
         short: why no further; empty if to the horizon.
@@ -64,6 +65,7 @@ class Truth:
     allowed: float = math.nan
     growth: float = math.nan
     tight: float = math.nan
+    witness: tuple[str, str] = ("", "")
     grows: float = 1.0
     firm: float = math.inf
     part: float = 1.0

@@ -13,8 +13,19 @@ from crossbody.cases import Tier
 from crossbody.reports import sections
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import called, label, style
-from crossbody.reports.judging.told import beyond, farthest, known_until, lacking, runs_of, sentence, share, telling
+from crossbody.reports.judging.told import (
+    NEXT,
+    beyond,
+    farthest,
+    known_until,
+    lacking,
+    runs_of,
+    sentence,
+    share,
+    telling,
+)
 from crossbody.reports.judging.verdict import Row, Word
+from crossbody.reports.layout import valid
 from crossbody.reports.pages import figures, grid
 from crossbody.reports.pages.errors import farthest_off
 from crossbody.reports.pages.friction import friction, hysteresis
@@ -50,6 +61,7 @@ PLAINLY = {
     Tier.D: "what the motion itself must keep, since no solution is known",
 }
 """What each kind of truth is, to a reader who has not read of them."""
+WHOLE = 100.0  # what a share, in per cent, is at best
 PARAMETERS = columns(name="Parameter", value=("Value", Kind.NUMBER), unit="Unit")
 
 
@@ -60,7 +72,7 @@ def case_page(found: Results, case: CaseFiles, share: float = 1.0) -> Page:
     about, sources = _about(case.about)
     said = sentence(runs_of(rows)).replace(f" on {case.label}", "") if rows else ""
     return Page(
-        name=case.page, title=case.label, lead=f"{said} {at_rest([case])}".strip(),
+        name=case.page, title=case.label, lead=NEXT.join(filter(None, [said, at_rest([case])])),
         about=f"{about}{_compared(traces, rows)}", sources=sources,
         opening=sum(one.template == "playback.html" for one in moving),
         word=grid.verdict(rows),
@@ -147,7 +159,10 @@ def _verdicts(found: Results, case: CaseFiles) -> Section:
     return Section(
         name="verdicts", title="Verdicts", template="verdicts.html",
         context={
-            "rows": [row | {"beyond": beyond(row), "lacking": lacking(row), "times": _times(row)} for row in rows],
+            "rows": [
+                row | {"beyond": beyond(row), "lacking": lacking(row), "times": _times(row), "share": _share(row)}
+                for row in rows
+            ],
             "counts": _counted(rows), "causes": _causes(rows), "off": any(_off(row) for row in rows),
             "truths": _truths(case.about), "judged": any(row["verdict"] != Word.INFO for row in rows),
             "missing": case.missing, "engines": list(dict.fromkeys(row["who"] for row in rows)),
@@ -169,8 +184,13 @@ def _off(row: Row) -> bool:
 
 def _times(row: Row) -> str:
     """How many times its limit a number is, where it is beyond it."""
-    times = share(row)
+    times = math.inf if _share(row) else share(row)
     return f"{times:.2g}" if _off(row) and math.isfinite(times) else ""
+
+
+def _share(row: Row) -> str:
+    """What is valid of a share of the whole, whose limit is no size; nothing of other numbers."""
+    return valid(row["expected"], row["limit"]) if row["unit"] == "%" and row["expected"] == WHOLE else ""
 
 
 def _causes(rows: Sequence[Row]) -> list[dict[str, Any]]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Mode, Tier
 from crossbody.cases.arrays import Floats, quantiles
-from crossbody.cases.scene_contacts import WAYS
+from crossbody.cases.scene_contacts import WAYS, without_gap
+from crossbody.cases.scene_plain import scene_from
 from crossbody.reports.figures.section import Figure, Plot
 from crossbody.reports.figures.styles import label
 from crossbody.reports.judging.verdict import Row
@@ -471,7 +472,8 @@ def note(name: str, traces: Sequence[Trace], limits: Limits = NONE) -> str:
         names, found = _names(traces, noun), _ranked(name, traces, limits)
         if len(found) > MOST_SIGNALS:
             told.append(f"{MOST_SIGNALS} of {len(found)} {noun} are drawn; all are stored.")
-        if name in IDLE_NOTES and (rest := [name for k, name in names.items() if k not in found]):
+        bare = _without_gap(traces[0]) if name == "penetration" else set[str]()
+        if name in IDLE_NOTES and (rest := [one for k, one in names.items() if k not in found and one not in bare]):
             told.append(f"{IDLE_NOTES[name]}: {few(normals(rest))}.")
     if name == "energy" and (
         without := [label(one) for one in traces if one.run.ledger is None and label(one) != TRUTH]
@@ -484,6 +486,13 @@ def note(name: str, traces: Sequence[Trace], limits: Limits = NONE) -> str:
     return " ".join(filter(None, told))
 
 
+def _without_gap(trace: Trace) -> set[str]:
+    """Names of rows that have no surface: of friction."""
+    names, scene = trace.about["contacts"], trace.about.get("scene")
+    count = 0 if scene is None else without_gap(scene_from(scene))
+    return set(names) - set(normals(names[: len(names) - count]))
+
+
 def few(names: Sequence[str], most: int = NAMED) -> str:
     """Some names, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
@@ -492,7 +501,13 @@ def few(names: Sequence[str], most: int = NAMED) -> str:
 
 def normals(names: Sequence[str]) -> list[str]:
     """Names without the tangential rows of contacts that are among them."""
-    return [name for name in names if not (name[-2:] in WAYS and name[:-3] in names)]
+    return [name for k, (name, row) in enumerate(zip(names, led(names), strict=True)) if row == k]
+
+
+def led(names: Sequence[str]) -> list[int]:
+    """Return of each row which one bears it: of tangential rows of contacts their normal row, of others themselves."""
+    rows = {name: k for k, name in enumerate(names)}
+    return [rows.get(name[:-3], k) if name[-2:] in WAYS else k for k, name in enumerate(names)]
 
 
 def _same(traces: Sequence[Trace]) -> Iterator[str]:

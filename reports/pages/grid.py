@@ -15,6 +15,7 @@ from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.html import BEYOND, number
+from crossbody.reports.replay.meanings import meaning
 
 WORST = (Word.CRASHED.value, Word.OUTSIDE.value, Word.EXPECTED.value, Word.WITHIN.value)
 """Judged verdicts, the worst first."""
@@ -70,7 +71,8 @@ class Cell:
 class Line:
     """One line: its name, what stands beside it, the page that it leads to, a cell for every engine, and a sketch.
 
-    The sketch is a line of points in a box of 100 by 20, as SVG writes them. The title says what the line means.
+    The sketch is a line of points in a box of 100 by 20, as SVG writes them, of what `sketched` says. The title says
+    what the line means.
     """
 
     text: str
@@ -78,6 +80,7 @@ class Line:
     small: str = ""
     page: str = ""
     sketch: str = ""
+    sketched: str = ""
     title: str = ""
 
 
@@ -219,7 +222,7 @@ def _metrics(rows: Sequence[Row], mine: Mapping[str, Sequence[Row]], engines: Se
 
 def _meaning(metric: str) -> str:
     """Say what a metric measures; nothing of those that a case brings along, and of parts of errors."""
-    return metrics.summary(metric) if metric in metrics.names() else ""
+    return metrics.summary(metric) if metric in metrics.names() else meaning(metric)
 
 
 def _urgent(row: Row) -> tuple[Any, ...]:

@@ -43,6 +43,12 @@ SIGNS = {
     "ledger only": "∑", "skipped": "-", "crashed": "!", (BEYOND := "beyond, not judged"): "▲",
 }  # fmt: skip
 """A verdict is shown by sign and word besides its colour."""
+KEYS = {
+    "within": "its limits", "expected-outside": "as far as a known property of the engine explains",
+    "outside": "a limit, or without the number", "crashed": "with an exception",
+    BEYOND: "a limit, for a known cause of unknown size", "skipped": "not run",
+}  # fmt: skip
+"""What each word of a table means, to a reader who has not read of it."""
 MOST = 2000  # rows of a table that a page shows; the file beside it has all
 UNFOLDED = 500  # characters of a text in a table that are shown at once
 THEME = (
@@ -180,7 +186,7 @@ def environment() -> Environment:
         "text_packed": packed_text,
         "value_packed": packed_value,
     }
-    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "BEYOND": BEYOND, "MOST": MOST, "UNFOLDED": UNFOLDED}
+    made.globals |= {"Kind": Kind, "SIGNS": SIGNS, "KEYS": KEYS, "BEYOND": BEYOND, "MOST": MOST, "UNFOLDED": UNFOLDED}
     return made
 
 

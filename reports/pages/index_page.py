@@ -13,8 +13,9 @@ import numpy as np
 from crossbody.cases import Trajectory, installed
 from crossbody.reports.figures.section import Kind, Section, Table, columns
 from crossbody.reports.figures.styles import look
-from crossbody.reports.judging.told import WRONG, beyond, runs_of, sentence, share, telling
+from crossbody.reports.judging.told import NEXT, WRONG, beyond, runs_of, sentence, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
+from crossbody.reports.layout import unit_text
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages import grid
 from crossbody.reports.pages.case_page import provenance
@@ -34,8 +35,8 @@ WORDS = columns(
 )  # fmt: skip
 VALUES = columns(
     label="Case", who="Engine", metric="Metric", value_before=("Before", Kind.NUMBER),
-    value=("Now", Kind.NUMBER), limit=("Limit", Kind.NUMBER), unit="Unit",
-    moved=("Moved by, of the limit", Kind.NUMBER),
+    value=("Now", Kind.NUMBER), limit_before=("Limit before", Kind.NUMBER), limit=("Limit now", Kind.NUMBER),
+    unit="Unit", moved=("Moved by, of the limit", Kind.NUMBER),
 )  # fmt: skip
 SHOWN = 100  # cases on one page of the index
 TITLED = 2  # cases that the title names
@@ -46,17 +47,23 @@ def changes(now: Sequence[Row], before: Sequence[Row], name: str) -> Section:
     """The section that says what changed in verdicts, with `label` and `who`, since a run of that name."""
     known, here = _by_key(before), _by_key(now)
     kept = [
-        row | {f"{field}_before": known[key][field] for field in ("verdict", "value")}
-        for key, row in here.items()
-        if key in known
-    ]
+        row | {"unit": unit_text(row["unit"], "{}")}
+        | {f"{field}_before": known[key][field] for field in ("verdict", "value", "limit")}
+        for key, row in here.items() if key in known
+    ]  # fmt: skip
+    bounds = sum(_other(row["limit"], row["limit_before"]) for row in kept)
+    labels = {row["label"] for row in now}
+    gone = [key for key in known.keys() - here if known[key]["label"] in labels]
+    left = {row["label"] for row in before} - labels
     words = [row for row in kept if row["verdict"] != row["verdict_before"]]
     moved = moves(row for row in kept if row["verdict"] == row["verdict_before"])
     text = (
         f"Against {name}: {len(words)} of {len(kept)} verdicts changed, {len(moved)} values "
-        f"moved by more than {MOVED:.0%} of their limit, {len(here.keys() - known)} rows are "
-        f"new, {len(known.keys() - here)} are gone."
+        f"moved by more than {MOVED:.0%} of the narrower of both limits, {bounds} limits are others, "
+        f"{len(here.keys() - known)} rows are new, {len(gone)} are gone."
     )
+    told = [f"{len(left)} cases of it were not run now."] if left else []
+    text = " ".join([text, *told, *_settings(now, before)])
     tables = (
         Table(title="Verdicts that changed", columns=WORDS, rows=words),
         Table(title="Values that moved", columns=VALUES, rows=moved),
@@ -64,21 +71,40 @@ def changes(now: Sequence[Row], before: Sequence[Row], name: str) -> Section:
     return Section(name="changes", title="What changed", text=text, tables=[t for t in tables if t.rows])
 
 
+def _other(one: float | None, other: float | None) -> bool:
+    """Whether limits differ; none is one, too."""
+    return one != other and not (one is None or other is None or (one != one and other != other))
+
+
+def _settings(now: Sequence[Row], before: Sequence[Row]) -> list[str]:
+    """Say which settings of engines are others than before."""
+    known, found = {(row["label"], row["who"]): row["settings"] for row in before}, dict[str, None]()
+    for row in now:
+        was, own = known.get((row["label"], row["who"]), "").split(), row["settings"].split()
+        changed = [(one, next((old for old in was if old.split("=")[0] == one.split("=")[0]), "")) for one in own]
+        told = [f"{new} instead of {old.partition('=')[2]}" for new, old in changed if old and new != old]
+        if told:
+            found[f"{row['who']} ran with {', '.join(told)}."] = None
+    return list(found)
+
+
 def _by_key(rows: Sequence[Row]) -> dict[tuple[str, ...], Row]:
     return {tuple(row[name] for name in KEY): row for row in rows}
 
 
 def moves(rows: Iterator[Row]) -> list[dict[str, Any]]:
-    """Rows whose value moved by more than `MOVED` of their limit, the largest first."""
+    """Rows whose value moved by more than `MOVED` of the narrower of its limits, the largest first."""
     found = [row | {"moved": _share(row)} for row in rows]
     return sorted((row for row in found if row["moved"] > MOVED), key=lambda row: -row["moved"])
 
 
 def _share(row: Row) -> float:
-    """By how much of its limit a value moved; infinite where that is 0, nothing without numbers."""
-    value, before, limit = (row[name] for name in ("value", "value_before", "limit"))
-    if value is None or before is None or limit is None:
+    """By how much of its narrower limit a value moved; infinite where that is 0, nothing without numbers."""
+    value, before = row["value"], row["value_before"]
+    limits = [one for one in (row["limit"], row.get("limit_before")) if one is not None and one == one]
+    if value is None or before is None or not limits:
         return 0.0
+    limit = min(limits)
     apart = abs(value - before)
     return apart / limit if limit else math.inf if apart else 0.0
 
@@ -91,12 +117,18 @@ def index_pages(found: Results) -> list[Page]:
         Page(
             name=name,
             title=_title(found) if i == 0 else f"Cases {i * SHOWN + 1} to {i * SHOWN + len(cases)}",
-            lead=f"{sentence(runs_of(found.verdicts))} {at_rest(found.cases)}".strip() if found.verdicts else "",
+            lead=_lead(found),
             word=grid.verdict(found.verdicts),
             engines=[{"name": who, "shown": who, **look(who)} for who in found.engines],
             sections=_sections(found, cases, names, i),
         ) for i, (name, cases) in enumerate(zip(names, cut, strict=True))
     ]  # fmt: skip
+
+
+def _lead(found: Results) -> str:
+    """What the verdicts come to, and where nothing moves."""
+    told = [sentence(runs_of(found.verdicts)), at_rest(found.cases)] if found.verdicts else []
+    return NEXT.join(filter(None, told))
 
 
 def _title(found: Results) -> str:
@@ -146,7 +178,7 @@ def _line(found: Results, case: CaseFiles, shown: Sequence[str]) -> grid.Line:
     cells = [
         grid.whole(case.label, case.page, who, mine.get(who, ()), found.walls.get((case.label, who))) for who in shown
     ]
-    return grid.Line(text=case.label, page=case.page, cells=cells, small=_worst(found, case), sketch=_sketch(case))
+    return grid.Line(text=case.label, page=case.page, cells=cells, small=_worst(found, case), **_sketch(case))
 
 
 def _worst(found: Results, case: CaseFiles) -> str:
@@ -161,11 +193,12 @@ def _worst(found: Results, case: CaseFiles) -> str:
     return f"{row['who'].removesuffix(':')}: {row['metric']} {grid.short(row['value'])}{more}"
 
 
-def _sketch(case: CaseFiles) -> str:
-    """The first coordinate of the truth over time, of a motion that is there."""
-    if not case.paths or case.about.get("engine") != TRUTH:
-        return ""
-    return sketched(load(case.paths[0]).run)
+def _sketch(case: CaseFiles) -> dict[str, str]:
+    """The first coordinate of the truth over time, of a motion that is there, and its name."""
+    if not case.paths or case.about.get("engine") != TRUTH or not (points := sketched(run := load(case.paths[0]).run)):
+        return {}
+    name = next((one["name"] for one in case.about.get("coordinates", ())), "")
+    return {"sketch": points, "sketched": f"{name} from {run.t[0]:g} to {run.t[-1]:g} s".strip()}
 
 
 def sketched(run: Trajectory) -> str:

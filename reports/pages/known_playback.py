@@ -97,8 +97,8 @@ def _words() -> Iterator[Said]:
     events = tuple(Event(t=float(k), contact=0, before=one, after=two) for k, (one, two) in enumerate(pairs))
     instants, told = playback.happens(replace(made, run=replace(made.run, events=events)))
     yield "instants of all changes", instants, [e.t for e in events]
-    touches = {("FREE", "CONTACT"), ("FREE", "COLLISION")}
-    words = ["touches" if (a.name, b.name) in touches else WORDS[b.name] for a, b in pairs]
+    touches = {"CONTACT": "touches", "COLLISION": "touches", "STICK": "touches and sticks", "SLIP": "touches and slips"}
+    words = [(touches if a.name == "FREE" else WORDS).get(b.name, WORDS[b.name]) for a, b in pairs]
     yield "words of all changes", tuple(told), tuple(f"{CONTACTS[0]} {word}" for word in words)
 
 
@@ -216,6 +216,7 @@ def _rows() -> Iterator[Said]:
     slant = np.tile(SLANT, (n, 1))
     q = np.concatenate([one, upright, two, slant, hull, slant, turn], axis=1)
     lam, up = draw.uniform(1.0, 9.0, (n, 3 + 2 + 2 + len(CORNERS) + 2)), np.array([0.0, 0.0, 1.0])
+    first = np.concatenate([lam[:, 11:13], lam[:, 5:6]], axis=1)  # friction along the plane's axes, behind all normals
     w, x, y, z = SLANT
     turned = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
                        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
@@ -225,7 +226,7 @@ def _rows() -> Iterator[Said]:
     corners, bears = hull[:, None, :] + np.array(CORNERS) @ turned.T, lam[:, 7:11, None]
     wanted = {
         "a loop": (np.concatenate([0.5 * c - 0.1 * s, 0.5 * s + 0.1 * c, 0.0 * c], axis=1), lam[:, :3]),
-        "a ball on the floor": (one - R * up, lam[:, 5:6] * up), "two balls": (two - R * apart, lam[:, 6:7] * apart),
+        "a ball on the floor": (one - R * up, first), "two balls": (two - R * apart, lam[:, 6:7] * apart),
         "a hull": ((bears * corners).sum(axis=1) / bears.sum(axis=1), bears.sum(axis=1) * up),
     }  # fmt: skip
     own: Any = {"scene": plain(_met())}

@@ -159,11 +159,21 @@ class Film:
                 ball = solid["radius"] * self.to.scale * ROUND
                 around = _hull((flat[:, None] + ball).reshape(-1, 2))
                 radius = solid["radius"] * self.to.scale if len(points) == 1 else 0.0
-                drawn.append(
-                    (self.to.depth(points).mean(), Stroke(around, self.color, _pale(self.color), radius=radius))
-                )
-        for _, stroke in sorted(drawn, key=lambda one: -one[0]):
-            yield stroke
+                strokes = [Stroke(around, self.color, _pale(self.color), radius=radius)]
+                strokes += [Stroke(self.to(line), self.color, width=0.8) for line in self._marks(solid, pose)]
+                drawn.append((self.to.depth(points).mean(), strokes))
+        for _, strokes in sorted(drawn, key=lambda one: -one[0]):
+            yield from strokes
+
+    def _marks(self, solid: scenes.Shape, pose: Floats) -> Iterator[Floats]:
+        """Yield the parts of lines on a round solid that are not behind it."""
+        for line in solid.get("marks", ()):
+            at, out = np.split(np.asarray(line), 2, axis=1)
+            points = _placed({**solid, "points": at}, pose)
+            ahead = self.to.depth(_placed({**solid, "points": at + out}, pose)) <= self.to.depth(points)
+            for part in np.split(np.arange(len(points)), np.flatnonzero(np.diff(ahead)) + 1):
+                if ahead[part[0]] and len(part) > 1:
+                    yield points[part]
 
     def _arrows(self, pushes: Floats) -> Iterator[Stroke]:
         n = self.stage.dimensions

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -18,7 +19,7 @@ from crossbody.reports.measuring.cubics import coordinates
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.errors import told
-from crossbody.reports.pages.figures import carrying, few, normals
+from crossbody.reports.pages.figures import carrying, few, led, normals
 from crossbody.reports.runs.store import Trace
 
 ROOM = 280_000  # room of the motions on a page, bytes
@@ -35,12 +36,16 @@ HAPPENS = {
     Mode.SLIP: "slips",
 }  # fmt: skip
 """What a contact does when it comes into a mode."""
+_SINGULAR = re.compile(r"(?<=ch)es\b|(?<=ss)es\b|(?<!s)s\b")
+"""Ends of what one contact does, which several do without."""
+TOUCHING = (Mode.CONTACT, Mode.COLLISION, Mode.STICK, Mode.SLIP)
 TEXT = (
-    "All engines at the same time, which the plots below share. Arrows are the forces of contacts along their "
-    "normals, without friction, and of loops, with lengths proportional to the force; each shows the largest force "
+    "All engines at the same time, which the plots below share. Arrows are the whole forces of contacts, friction "
+    "included, and of loops, with lengths proportional to the force; each shows the largest force "
     "since the previous frame, so that no impact is missed. An instantaneous collision has an impulse instead of a "
     "force: a hollow arrow that fades. An arrow that is cut off has a bar across. Differences from the truth can be "
-    "exaggerated 10 and 100 times, of all engines or of one, at the scale of the picture, which they may leave."
+    "exaggerated 10 and 100 times, of all engines or of one, at the scale of the picture, which they may leave. "
+    "Keys, with the picture focused: space plays, comma and full stop go to the previous and next event, + and - zoom."
 )
 
 
@@ -136,15 +141,18 @@ def _said(events: Sequence[Event], contacts: Sequence[str]) -> str:
     names = normals(list(dict.fromkeys(contacts[event.contact] for event in events)))
     does = list(dict.fromkeys(map(_does, events)))
     said = " and ".join(does) if len(does) <= FEW and len(events) <= 2 * FEW * len(names) else f"{len(events)} events"
-    return f"{names[0]} {said}" if len(names) == 1 and len(does) <= FEW else f"{few(names, FEW)}: {said}"
+    if len(names) > 1 or len(does) > FEW:
+        return f"{few(names, FEW)}: {said}"
+    return f"{names[0]} {_SINGULAR.sub('', said) if ' and ' in names[0] else said}"
 
 
 def _does(event: Event) -> str:
     """What a contact does."""
     if event.impulse:
         return "bounces"
-    touches = event.before == Mode.FREE and event.after in (Mode.CONTACT, Mode.COLLISION)
-    return "touches" if touches else HAPPENS[event.after]
+    if event.before != Mode.FREE or event.after not in TOUCHING:
+        return HAPPENS[event.after]
+    return f"touches and {HAPPENS[event.after]}" if event.after in (Mode.STICK, Mode.SLIP) else "touches"
 
 
 def _track(
@@ -153,7 +161,7 @@ def _track(
     run = trace.run
     t = distinct(np.clip(instants, run.t[0], run.t[-1]))
     q = coordinates(run, t, trace.quaternions)
-    lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t, side="right"), 1))
+    lam = peaks(run.lam, np.maximum(np.searchsorted(run.t, t, side="right"), 1), led(trace.about["contacts"]))
     poses, arrows = scene.poses(q, parameters), scene.arrows(q, lam, parameters)[:, pushing]
     look = style(trace)
     return {
@@ -197,17 +205,19 @@ def _near(run: Trajectory, count: int) -> Floats:
     return found
 
 
-def peaks(lam: Floats, ends: NDArray[np.intp]) -> Floats:
+def peaks(lam: Floats, ends: NDArray[np.intp], leads: Sequence[int] | None = None) -> Floats:
     """Of every multiplier the value of largest size since the picture before (frames, nc), N.
 
     `ends` are how many samples are past at each picture (frames,), nondecreasing, at least 1; 0
-    where nobody can tell.
+    where nobody can tell. `leads` are rows at whose largest values those of others are taken (nc,):
+    friction where its contact presses most, so that both are forces of one instant.
     """
     known = np.nan_to_num(lam)
     found = np.empty((len(ends), lam.shape[1]))
     for i, (a, b) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
         part = known[min(a, b - 1) : b]
-        found[i] = part[np.argmax(np.abs(part), axis=0), np.arange(lam.shape[1])]
+        largest = np.argmax(np.abs(part), axis=0)
+        found[i] = part[largest if leads is None else largest[leads], np.arange(lam.shape[1])]
     return found
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from crossbody.cases import OutputError
 from crossbody.reports import sections as studies
 from crossbody.reports.figures.section import Section
-from crossbody.reports.judging.told import WRONG
+from crossbody.reports.judging.told import NEXT, WRONG
 from crossbody.reports.pages.case_page import case_page, provenance
 from crossbody.reports.pages.html import Link, Page, assets, render
 from crossbody.reports.pages.index_page import index_pages
@@ -130,19 +130,28 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     """Every page, made one after another; a folder without cases is led by its study."""
     studied = list(_studies(found))
     alone = studied if _leads(found) else []
+    first = [section for study in alone for section in study.sections]
+    led = [section.says for section in first if section.says]
     for page in index_pages(found):
         if page.name == INDEX:
-            title = " · ".join(study.title for study in alone) if alone and not found.cases else page.title
-            first = [section for study in alone for section in study.sections]
+            title = " · ".join(map(_called, alone)) if alone and not found.cases else page.title
             page = replace(page, title=title, sections=[*first, *page.sections])
-            if led := [section.says for section in first if section.says]:
+            if led:
                 off = [page.lead] if any(row["verdict"] in WRONG for row in found.verdicts) else []
-                page = replace(page, lead=" ".join([*off, *led]), sections=[replace(s, says="") for s in page.sections])
+                page = replace(
+                    page, lead=NEXT.join([*off, *led]), sections=[replace(s, says="") for s in page.sections]
+                )
         yield page
     if not alone:
         yield from studied
     for case in found.cases:
-        yield case_page(found, case, share)
+        page = case_page(found, case, share)
+        yield replace(page, lead=NEXT.join(led)) if led else page
+
+
+def _called(study: Page) -> str:
+    """The title of a study, with the case where its first section names it."""
+    return next((one.title for one in study.sections if one.title.startswith(study.title)), study.title)
 
 
 def _leads(found: Results) -> bool:

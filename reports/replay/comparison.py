@@ -15,6 +15,7 @@ from crossbody.cases.arrays import distinct
 from crossbody.cases.errors import several
 from crossbody.hw import Comparison, Fit, Log, Prediction
 from crossbody.hw.replaying.comparison import Row
+from crossbody.hw.windows.whiteness import autocorrelation
 from crossbody.reports.judging.verdict import COLUMNS, Verdict, Word, judge, limit_for
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace, save
@@ -29,6 +30,7 @@ WHOLE = 100.0  # what a share in percent would be at best
 FAILED = "A run that ends early predicts nothing after its end."
 MEASURED, SYNTHETIC = "measurement", "SYNTHETIC, no measurement"
 CALLED = "measured"  # what plots call a log, which stands where other cases have their truth
+CORRELATIONS = ("who", "channel", "input", "lag", "lag_s", "value", "band")
 RESIDUALS = ("who", "channel", "unit", "window", "t", "measured", "value")
 
 
@@ -169,7 +171,7 @@ def findings(found: Comparison) -> pd.DataFrame:
 def correlations(found: Comparison) -> pd.DataFrame:
     """Residual tests: every lag, also in s, of every autocorrelation and of every correlation with an input."""
     rows = [row for prediction in found.predictions for row in _correlations(found, prediction)]
-    return pd.DataFrame(rows, columns=["who", "channel", "input", "lag", "lag_s", "value", "band"])
+    return pd.DataFrame(rows, columns=list(CORRELATIONS))
 
 
 def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[str, Any]]:
@@ -201,6 +203,45 @@ def residuals(found: Comparison, points: int = 2000) -> pd.DataFrame:
             told = (who, c.name, c.unit, windows[at], found.time[at], found.measured[at, i], left[at, i])
             rows.append(pd.DataFrame(dict(zip(RESIDUALS, told, strict=True))))
     return pd.concat(rows, ignore_index=True)
+
+
+def left_by_fit(fit: Fit, found: Comparison, points: int = 2000) -> pd.DataFrame:
+    """What a fit leaves in its windows (`value`), at even samples of all of them, as `residuals` has it of a replay."""
+    rows = [pd.DataFrame(columns=list(RESIDUALS))]
+    if fit.left:
+        t, left = (np.concatenate(parts) for parts in zip(*fit.left, strict=True))
+        windows = np.repeat(fit.fitted, [len(one) for one, _ in fit.left])
+        at = distinct(np.linspace(0, len(t) - 1, min(points, len(t))).astype(int))
+        for i, (name, unit) in enumerate(_channels(fit, found)):
+            told = (_who(found), name, unit, windows[at], t[at], math.nan, left[at, i])
+            rows.append(pd.DataFrame(dict(zip(RESIDUALS, told, strict=True))))
+    return pd.concat(rows, ignore_index=True)
+
+
+def correlations_of_fit(fit: Fit, found: Comparison) -> pd.DataFrame:
+    """Autocorrelation of what a fit leaves, sample by sample: what its intervals take for white, or not."""
+    rows = []
+    for i, (name, _) in enumerate(_channels(fit, found) if fit.left else ()):
+        test = autocorrelation([left[:, i] for _, left in fit.left])
+        step = float(np.median(np.concatenate([np.diff(t) for t, _ in fit.left])))
+        rows += [
+            {"who": _who(found), "channel": name, "input": "", "lag": lag, "lag_s": lag * step, "value": value,
+             "band": test.band}
+            for lag, value in zip(test.lags.tolist(), test.values.tolist(), strict=True)
+        ]  # fmt: skip
+    return pd.DataFrame(rows, columns=list(CORRELATIONS))
+
+
+def _who(found: Comparison) -> str:
+    """Who runs the model."""
+    return next((f"{one.engine}:{one.profile}" for one in found.predictions), "")
+
+
+def _channels(fit: Fit, found: Comparison) -> list[tuple[str, str]]:
+    """Names and units of what a fit compares: coordinates, but of what turns in space three angles."""
+    if fit.left[0][1].shape[1] == len(found.coordinates):
+        return [(c.name, c.unit) for c in found.coordinates]
+    return [(f"difference {k + 1}", "") for k in range(fit.left[0][1].shape[1])]
 
 
 def profile(fit: Fit) -> pd.DataFrame:

@@ -13,6 +13,11 @@ from crossbody.reports.runs import watch
 
 DEFAULT_CASES = ("bouncing_ball",)
 DEFAULT_ENGINES = ("reference", "mujoco", "pinocchio")
+DEAR = 4.0
+"""Time, in budgets, that a run of a file may take unless its profile is asked for: engines that follow the law take
+their steps in Python."""
+COMPILED = ("reference", "compiled")  # who follows what the truth has followed
+CVODE = "reference:cvode"  # the witness of most truths of files
 _EXAMPLES = {"--set": "a1=0", "--set-engine": "dt=1e-4", "--at": "z=0.4"}
 
 
@@ -121,6 +126,16 @@ def of_case(pick: Pick, case: Case) -> Pick:
     if not pick.every or pick.skipped or not case.file:
         return pick
     return replace(pick, profile=engines.load(pick.engine).of_scenes.get(pick.profile, pick.profile))
+
+
+def bounded(case: Case, pick: Pick) -> bool:
+    """Return whether a run is left out where it takes too long, or is the witness of its truth."""
+    return pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
+
+
+def with_bound(case: Case, pick: Pick, asked: Mapping[str, Value], budget: float) -> dict[str, Value]:
+    """Return the settings that are asked for, with the time that the run may take, in budgets of so many s."""
+    return {"time_limit": DEAR * budget, **asked} if bounded(case, pick) else dict(asked)
 
 
 def of_pick(settings: Mapping[str, Value], pick: Pick) -> dict[str, Value]:

@@ -33,18 +33,25 @@ from crossbody.reports.judging.truth import law_of, truth_of, with_both_sides
 from crossbody.reports.judging.units_of_scene import units_of_scene
 from crossbody.reports.measuring.truth import Truth, sample_times
 from crossbody.reports.runs import watch
-from crossbody.reports.runs.choice import Pick, check_known, of_case, of_pick, offered
+from crossbody.reports.runs.choice import (
+    COMPILED,
+    DEAR,
+    Pick,
+    bounded,
+    check_known,
+    of_case,
+    of_pick,
+    offered,
+    with_bound,
+)
 from crossbody.reports.runs.refined import refined
 
 TRUTHS = 3.0  # a truth may take so many times as long as a run: it is two of them, at tight tolerances
 ENOUGH = 2000  # steps of a run that is drawn as it is
-FIRST, DEAR = 0.02, 4.0
-"""Part of its horizon by which a run of a scene is estimated, and the time, in budgets, beyond which it is not begun
-unless its profile is asked for: engines that follow the law take their steps in Python."""
+FIRST = 0.02  # part of its horizon by which a run of a scene is estimated
 AHEAD, BEYOND = 0.05, 1.0
 """Part of the time for which a truth is known by which a run goes on behind it, and the time, in budgets, that it may
 take from there to its horizon: nothing is compared there."""
-COMPILED = ("reference", "compiled")  # who follows what the truth has followed
 _OF_RUNS = {"profile": TEXT, "settings": Public("a mapping from names to values", lambda one: isinstance(one, Mapping))}
 _Kind = TypeVar("_Kind")
 
@@ -184,7 +191,7 @@ def _as_far(case: Case, pick: Pick, known: float, run: Callable[..., Entry]) -> 
         known: the end of the truth, s.
         run: runs a case, unless what is left, so many times as long, is cheap (`_CheapError`).
     """
-    short = ahead_of(case, known) if _bounded(case, pick) else case
+    short = ahead_of(case, known) if bounded(case, pick) else case
     try:
         found = run(short, left=case.t_end / short.t_end - 1.0)
     except _CheapError:
@@ -204,11 +211,6 @@ def ahead_of(case: Case, known: float) -> Case:
     return replace(case, t_end=end) if case.general and end < case.t_end else case
 
 
-def _bounded(case: Case, pick: Pick) -> bool:
-    """Return whether a run is left out where it takes too long."""
-    return pick.every and bool(case.file) and (pick.engine, pick.profile) != COMPILED
-
-
 def _ran(
     case: Case, pick: Pick, asked: Mapping[str, Value], reference: Mapping[str, Any], refine: bool, budget: float,
     truth: Truth, left: float = 0.0,
@@ -216,8 +218,9 @@ def _ran(
     most = DEAR * budget
     if pick.every and (dear := _dear(case, pick, asked, most)):
         raise CaseUnsupported(dear)
-    bounded = _bounded(case, pick)
-    prepared = prepare(case, pick, {"time_limit": most, **asked} if bounded else asked)
+    if bounded(case, pick) and (pick.engine, pick.profile) == truth.witness:
+        raise CaseUnsupported(f"It is the witness of the truth. -e {pick.engine}:{pick.profile} runs it again.")
+    prepared = prepare(case, pick, with_bound(case, pick, asked, budget))
     if why := runaway(case, prepared.settings, lambda first, more: prepare(first, pick, {**asked, **more})):
         stopped = replace(of_start(case, why), outcome=Outcome.STEP_LIMIT)
         return Entry(engine=pick.engine, profile=pick.profile, settings=prepared.settings, run=stopped)
@@ -236,7 +239,7 @@ def _ran(
     made = prepared.run()
     around = perf_counter() - clock
     natural = _of_case(case, pick, made)
-    if bounded and natural.outcome is Outcome.TIME_LIMIT:
+    if bounded(case, pick) and natural.outcome is Outcome.TIME_LIMIT:
         raise CaseUnsupported(_too_dear(pick, f"more than {most:.0f} s"))
     took = process_time() - began  # with what is observed, which may cost more than the steps
     if natural.outcome.ok and 0.0 < left * took <= BEYOND * budget:

@@ -40,8 +40,8 @@ class Stage:
         lines: indices of points joined by one line (spatial); dimensions are 3 where there are any.
         down: whether the third axis points down (spatial).
         solids: of bodies (-1: the world) in space, in their frames: `points` that a sphere of
-            `radius` is swept over, with the `faces` that have edges (indices of points); or a
-            `plane`: origin and two axes.
+            `radius` is swept over, with the `faces` that have edges (indices of points) and, of what is
+            round, `marks`: lines of points with the normals there; or a `plane`: origin and two axes.
         bones: pairs of bodies whose origins are joined by a line.
         frames: number of bodies that solids and bones speak of.
     """

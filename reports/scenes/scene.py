@@ -16,7 +16,7 @@ from crossbody.cases.scene import WIDTHS, Body, Joint, Scene
 from crossbody.cases.scene import Shape as SceneShape
 from crossbody.cases.scene_contacts import Contact, contacts
 from crossbody.cases.scene_plain import scene_from
-from crossbody.engines.nearest import Places, lying, meet
+from crossbody.engines.nearest import Places, across, lying, meet
 from crossbody.reports.scenes import Parameters, Stage
 
 Pose = tuple[Floats, Floats]  # origins (n, 3), m, and rotations (n, 3, 3) of one body
@@ -94,7 +94,7 @@ def poses(q: Floats, p: Parameters) -> Floats:
 
 
 def arrows(q: Floats, lam: Floats, p: Parameters) -> Floats:
-    """Return forces of contacts on their second shapes, of loops on their first points (n, arrows, 6)."""
+    """Return whole forces of contacts on their second shapes, of loops on their first points (n, arrows, 6)."""
     scene = _scene(p)
     found = list(_arrows(scene, q, np.nan_to_num(lam)))
     return np.stack(found, axis=1) if found else np.zeros((len(q), 0, 6))
@@ -109,23 +109,39 @@ def _arrows(scene: Scene, q: Floats, lam: Floats) -> Iterator[Floats]:
             yield np.concatenate([at, lam[:, row : row + 3]], axis=1)
         row += loop.width
     row += sum(int(np.isfinite(part.range).sum()) for part in scene.bounded)
-    for contact in contacts(scene):
+    met = contacts(scene)
+    rub = row + sum(contact.places for contact in met)
+    for contact in met:
         _, normals, points = _meeting(contact, bodies)
         pushing = lam[:, row : row + contact.places]
+        force = pushing[:, :, None] * np.nan_to_num(normals)
         row += contact.places
+        if contact.friction > 0.0:
+            at, by = _turns(contact, bodies)
+            ways = np.nan_to_num(across(contact.first.type, at[:, None], by[:, None], normals))
+            rubbing = lam[:, rub : rub + 2 * contact.places].reshape(-1, contact.places, 2)
+            force += (rubbing[..., None] * ways).sum(axis=2)
+            rub += 2 * contact.places
         if contact.second.type == "hull":
-            yield _resultant(normals[:, 0], points, pushing)
+            yield _resultant(force, points, pushing)
             continue
         for place in range(contact.places):
-            pushed = np.nan_to_num(normals[:, place]) * pushing[:, [place]]
-            yield np.concatenate([points[:, place], pushed], axis=1)
+            yield np.concatenate([points[:, place], force[:, place]], axis=1)
 
 
-def _resultant(normal: Floats, points: Floats, pushing: Floats) -> Floats:
-    """Return the sum of parallel forces (n, 6), where it acts: a hull has hundreds of corners."""
+def _resultant(force: Floats, points: Floats, pushing: Floats) -> Floats:
+    """Return the sum of forces (n, 6), where that of the parallel ones acts: a hull has hundreds of corners."""
     total = pushing.sum(axis=1, keepdims=True)
     share = np.divide(pushing, total, out=np.zeros_like(pushing), where=total != 0.0)
-    return np.concatenate([np.einsum("nk,nki->ni", share, points), normal * total], axis=1)
+    return np.concatenate([np.einsum("nk,nki->ni", share, points), force.sum(axis=1)], axis=1)
+
+
+def _turns(contact: Contact, bodies: Mapping[str, Pose]) -> tuple[Floats, Floats]:
+    """Return the rotations (n, 3, 3) of both shapes."""
+    at, by = (
+        bodies[shape.body][1] @ matrices(np.asarray(shape.orientation)) for shape in (contact.first, contact.second)
+    )
+    return at, by
 
 
 def _meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
@@ -182,7 +198,27 @@ def _solid(shape: SceneShape, body: int) -> dict[str, Any]:
         points, faces = shape.extents, _sides(shape.extents)
     else:
         points = _ball() * size
-    return _drawn(np.asarray(shape.position) + points @ turn.T, body, radius, faces)
+    drawn = _drawn(np.asarray(shape.position) + points @ turn.T, body, radius, faces)
+    marks = [
+        np.concatenate([np.asarray(shape.position) + at @ turn.T, out @ turn.T], axis=1) for at, out in _marks(shape)
+    ]
+    return drawn | {"marks": [np.round(line, 4).tolist() for line in marks]} if marks else drawn
+
+
+def _marks(shape: SceneShape) -> Iterator[tuple[Floats, Floats]]:
+    """Yield lines on a round shape, by which a turn about its axes is seen: their points, and the normals there."""
+    size = np.asarray(shape.size)
+    if shape.type == "sphere":  # a meridian and the equator
+        angle = np.linspace(0.0, 2.0 * np.pi, 17)
+        c, s, zero = np.cos(angle), np.sin(angle), np.zeros_like(angle)
+        yield from ((size[0] * line, line) for line in (np.column_stack([s, zero, c]), np.column_stack([c, s, zero])))
+    elif shape.type == "cylinder":  # a radius of each cap
+        for z in (-1.0, 1.0):
+            out = np.tile([0.0, 0.0, z], (2, 1))
+            yield np.array([[0.0, 0.0, z * size[1]], [size[0], 0.0, z * size[1]]]), out
+    elif shape.type == "capsule":  # a line along it
+        out = np.tile([1.0, 0.0, 0.0], (2, 1))
+        yield np.array([[size[0], 0.0, -size[1]], [size[0], 0.0, size[1]]]), out
 
 
 def _hidden(solid: Mapping[str, Any], shape: SceneShape, shapes: Sequence[SceneShape]) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from crossbody.reports.figures.section import Column, Kind, Plot, Section, Table, columns, records
+from crossbody.reports.judging.told import NEXT
 from crossbody.reports.runs.study import read_json
 from crossbody.reports.sections import _words as words
 
@@ -124,6 +125,8 @@ def _bench(out: Path) -> tuple[Section, ...]:
 def _conformance(out: Path) -> tuple[Section, ...]:
     if not _has(out, "conformance"):
         return ()
+    from crossbody.reports.importers.conformance import misread
+
     rows = _rows(out, "conformance")
     engines = list(dict.fromkeys(rows["engine"]))
     versions = {name: max(own["version"]) for name, own in rows.groupby("engine")}
@@ -138,7 +141,8 @@ def _conformance(out: Path) -> tuple[Section, ...]:
         Table(title="Features", columns=across, rows=[{name: "" for name in engines} | row for row in wide]),
     )
     title = STUDIES["conformance"].TITLE
-    return (Section(name="conformance", title=title, text=words.CONFORMANCE_TEXT, tables=tables),)
+    says = NEXT.join(misread(records(rows)))
+    return (Section(name="conformance", title=title, says=says, text=words.CONFORMANCE_TEXT, tables=tables),)
 
 
 def _gap_lines(out: Path) -> Table:
@@ -170,11 +174,13 @@ def _stability(out: Path) -> Iterator[Plot]:
 def _stress(out: Path) -> Iterator[Section]:
     if not _has(out, "stress_summary"):
         return
-    from crossbody.reports.sweep.map import in_words
+    from crossbody.reports.sweep.map import ERROR, in_words, unrun, varied
 
     table = _table("Runs by suite", words.SUITES, _rows(out, "stress_summary"), "stress")
-    says = in_words(_rows(out, "stress")) if _has(out, "stress") else ""
-    yield Section(name="stress", title="Stress runs by suite", says=says, text=words.STRESS_TEXT, tables=(table,))
+    rows = _rows(out, "stress") if _has(out, "stress") else None
+    says = "" if rows is None else NEXT.join([in_words(rows), *varied(rows), *unrun(rows)])
+    text = f"{words.STRESS_TEXT} {ERROR}"
+    yield Section(name="stress", title="Stress runs by suite", says=says, text=text, tables=(table,))
     if len(cells := _rows(out, "stress_map")):
         from crossbody.reports.maps.figure import stress_map
 

@@ -23,22 +23,30 @@ ANALYSIS_TEXT = (
     "row relative to its largest entry, and in the poles, relative to their modulus."
 )
 ANALYSIS_TABLES = (
+    ("Values at the operating points", "equilibria", columns(
+        place="Operating point", variable="Variable", value=("Value", Kind.NUMBER), outcome="Search",
+    )),
+    ("Poles", "poles", columns(
+        place="Operating point", led_by="Led by", real=("Real part [1/s]", Kind.NUMBER),
+        imag=("Imaginary part [rad/s]", Kind.NUMBER), frequency=("Frequency [rad/s]", Kind.NUMBER),
+        damping=("Damping ratio", Kind.NUMBER),
+    )),
     ("Linear models", "ranks", columns(
-        place="Equilibrium", states=("States", Kind.NUMBER), controllable=("Controllable", Kind.NUMBER),
+        place="Operating point", states=("States", Kind.NUMBER), controllable=("Controllable", Kind.NUMBER),
         observable=("Observable", Kind.NUMBER), growth=("Growth [1/s]", Kind.NUMBER),
     )),
     ("Characteristic polynomials", "coefficients", columns(
-        place="Equilibrium", axis="Axis",
+        place="Operating point", axis="Axis",
         **{"s^2": ("s^2 [1/s]", Kind.NUMBER), "s": ("s [1/s^2]", Kind.NUMBER)},
         **{"1": ("1 [1/s^3]", Kind.NUMBER)}, coupling=("Coupling", Kind.NUMBER),
     )),
     ("Limits of stability", "limits", columns(
-        place="Equilibrium", parameter="Parameter", value=("Limit of stability", Kind.NUMBER),
+        place="Operating point", parameter="Parameter", value=("Limit of stability", Kind.NUMBER),
         unstable="Unstable", frequency=("Frequency [rad/s]", Kind.NUMBER),
     )),
     ("Without a linear model", "refusals", columns(place="State", why=("Why", Kind.LONG))),
     ("Linear models of engines", "engines", columns(
-        place="Equilibrium", engine="Engine", way="Way", slope=("Slope", Kind.NUMBER),
+        place="Operating point", engine="Engine", way="Way", slope=("Slope", Kind.NUMBER),
         poles=("Poles", Kind.NUMBER), unexplained=("Unexplained", Kind.NUMBER),
         limit=("Limit", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT), why=("Why", Kind.LONG),
     )),

@@ -19,20 +19,22 @@ ESTIMATES = columns(
     first_half=("First half of the data", Kind.NUMBER), second_half=("Second half", Kind.NUMBER),
 )  # fmt: skip
 HELD = columns(
-    error="Error", means=("Meaning", Kind.LONG), unit="Unit", fitted_before=("Fitted windows, start", Kind.NUMBER),
-    fitted_after=("Fitted windows, estimate", Kind.NUMBER),
-    held_before=("Held-out windows, start", Kind.NUMBER), held_after=("Held-out windows, estimate", Kind.NUMBER),
+    error="Error", held_before=("Held-out windows, start", Kind.NUMBER),
+    held_after=("Held-out windows, estimate", Kind.NUMBER), unit="Unit",
     change=("Change on held-out [%]", Kind.NUMBER), verdict=("Verdict", Kind.VERDICT),
+    fitted_before=("Fitted windows, start", Kind.NUMBER), fitted_after=("Fitted windows, estimate", Kind.NUMBER),
+    means=("Meaning", Kind.LONG),
 )  # fmt: skip
 MEANS = {
     "rmse": "root mean square of measured minus predicted",
     "end_median": "at the end of a window, median over windows",
     "end_90": "at the end of a window, 90 % quantile over windows",
 }
+JUDGED = {"within": "within its limit of growth", "outside": "it has grown beyond its limit"}
 OF_FIT = (
-    "These residuals are what the fit leaves in its windows, sample by sample. Metrics of the replay below, such as "
-    "autocorrelation_inside, are of predictions of all windows from their measured starts, whose noise shifts whole "
-    "windows."
+    "These residuals are what the fit leaves in its windows, from the starts that it fits, sample by sample: the "
+    "intervals come from them, and are wider where they are correlated. Metrics and residuals of the replay below are "
+    "of predictions of all windows from their measured starts, whose noise shifts whole windows."
 )
 PROFILE = (
     "The profile is how much the sum of squares rises, in % of that at the estimate, when one parameter is moved and "
@@ -51,11 +53,11 @@ def sections(out: Path) -> tuple[Section, ...]:
     estimates, held = (pd.DataFrame(read_json(out / f"{name}.json")["rows"]) for name in ("identify", "held_out"))
     low, high = (estimates[end].astype(float) for end in ("low", "high"))  # None where a fit was stopped
     estimates["half"] = (high - low) / 2.0
-    held["means"], held["unit"] = held["error"].map(MEANS), _unit(out)
+    held["means"] = held["error"].map(MEANS)
     told = read_json(out / "identify.json")["provenance"]["fit"]
     windows = [len(told[name]) for name in ("fitted", "held")]
     how = f"Derivatives: {told['sensitivities']}. Intervals: {told['covariance']}."
-    text = " ".join([*told["warnings"], how, OF_FIT])
+    text = " ".join([*told["warnings"], how])
     says = summary(estimates, held, *windows)
     estimates["identifiable"] = estimates["identifiable"].map({True: "yes", False: "no"})
     tables = (
@@ -64,25 +66,31 @@ def sections(out: Path) -> tuple[Section, ...]:
     )
     drawn = {
         name: pd.DataFrame(read_json(out / f"identify-{name}.json")["rows"])
-        for name in ("profile", "correlation")
+        for name in ("profile", "correlation", "residuals", "autocorrelation")
         if (out / f"identify-{name}.json").is_file()  # an earlier run has none
     }
-    plots = []
+    left, plots = [], []
+    if len(drawn.get("residuals", ())):
+        left = [
+            Plot(name="identify-residual", figure=figure.residual(drawn["residuals"], {})),
+            Plot(name="identify-autocorrelation", figure=figure.correlation(drawn["autocorrelation"])),
+        ]
     if len(drawn.get("profile", ())):
         plots.append(Plot(name="identify-profile", figure=figure.profile(drawn["profile"], estimates)))
     if len(estimates) > 1 and len(drawn.get("correlation", ())):
         plots.append(Plot(name="identify-correlation", figure=figure.together(drawn["correlation"])))
     first = Section(name="identify", title="Identified parameters", says=says, text=text, tables=tables)
-    if not plots:
-        return (first,)
-    return (first, Section(name="identify-plots", title="How well they are determined", text=PROFILE, plots=plots))
+    shown = (
+        Section(name="identify-left", title="What the fit leaves", text=OF_FIT, plots=left),
+        Section(name="identify-plots", title="How well they are determined", text=PROFILE, plots=plots),
+    )
+    return (first, *(section for section in shown if section.plots))
 
 
-def _unit(out: Path) -> str:
-    """Unit of what was measured; "mixed" where channels have several."""
-    rows = read_json(out / "replay.json")["rows"] if (out / "replay.json").is_file() else ()
-    units = {row["unit"] for row in rows if row["metric"] == "rmse"}
-    return units.pop() if len(units) == 1 else "mixed" if units else ""
+def one_unit(units: Sequence[str]) -> str:
+    """Return the unit of what was measured; "mixed" where channels have several."""
+    own = set(units)
+    return own.pop() if len(own) == 1 else "mixed" if own else ""
 
 
 def _only(rows: pd.DataFrame, shown: Sequence[Column]) -> pd.DataFrame:
@@ -94,7 +102,7 @@ def summary(estimates: pd.DataFrame, held: pd.DataFrame, fitted: int, left: int)
 
     Args:
         estimates: with name, value, low, high, unit and identifiable of each parameter.
-        held: with error, held_before and held_after, and verdict where it is judged.
+        held: with error, held_before and held_after, their unit, and verdict where it is judged.
         fitted: how many windows were fitted.
         left: how many were left out.
     """
@@ -110,6 +118,8 @@ def summary(estimates: pd.DataFrame, held: pd.DataFrame, fitted: int, left: int)
         return f"{text} No window of {fitted} was left out of the fit: nothing shows whether it holds on others."
     rmse = next((row for row in records(held) if row["error"] == "rmse"), None)
     if rmse is not None and rmse["held_before"] is not None and rmse["held_after"] is not None:
+        unit = unit_text(str(rmse.get("unit") or "").replace("mixed", ""))
+        judged = JUDGED.get(str(rmse.get("verdict")), "not judged")
         text += f" On held-out windows the rmse changed from {rmse['held_before']:.4g} to "
-        text += f"{rmse['held_after']:.4g} ({rmse.get('verdict') or 'not judged'})."
+        text += f"{rmse['held_after']:.4g}{unit} ({judged})."
     return text

@@ -10,6 +10,7 @@ import pandas as pd
 
 from crossbody.reports.figures.section import Kind, Plot, Section, Table, columns, records
 from crossbody.reports.layout import unit_text, valid
+from crossbody.reports.replay.meanings import meaning
 from crossbody.reports.runs.study import read_json
 
 TITLE = "Replay"
@@ -26,27 +27,13 @@ METRICS = columns(
 )  # fmt: skip
 JUDGED = ("outside", "crashed", "within")
 """Words of verdicts, the worst first."""
-MEANS = {
-    "fit": "share of the measured motion that is explained: 100 at best, 0 as far off as its mean, below 0 farther",
-    "rmse": "root mean square of measured minus predicted",
-    "largest": "largest of measured minus predicted",
-    "bias": "mean of measured minus predicted",
-    "delay": "how much later the measurement is than the prediction",
-    "noise": "of the measurement, one standard deviation",
-    "unexplained": "rmse without the noise",
-    "autocorrelation": "lags of the residuals' autocorrelation inside the band of noise, 99 at best",
-    "crosscorrelation": "lags of the residuals' correlation with an input inside the band, 99 at best",
-    "error": "size of the error at this time after the start of a window: median, or 90 % quantile",
-    "impacts": "impacts predicted minus impacts measured",
-    "impact": "instants of impacts against the measured ones",
-    "impulse": "sum over all impacts: its error, or the measured sum",
-    "windows": "windows whose prediction failed",
-    "speed": "duration of the motion over the computing time",
-}
-"""What metrics say, by the first words of their names."""
 FINDINGS = columns(
     what="Check", channel="Channel", row=("Row", Kind.NUMBER), t=("Time [s]", Kind.NUMBER), text=("Comment", Kind.LONG)
 )
+
+
+NEXT_STEP = "crossbody identify fits parameters of the model to this log."
+EXPLAINED = 99.0  # share of the motion, %, below which it is said what may be done
 
 
 def sections(out: Path) -> tuple[Section, ...]:
@@ -64,7 +51,7 @@ def sections(out: Path) -> tuple[Section, ...]:
     )  # none was judged once
     numbers = metrics[["expected", "limit"]].astype(float)
     metrics["valid"] = [valid(*pair) for pair in zip(numbers["expected"], numbers["limit"], strict=True)]
-    metrics["means"] = metrics["metric"].map(lambda name: MEANS.get(name.partition("_")[0], ""))
+    metrics["means"] = metrics["metric"].map(meaning)
     metrics["unit"] = metrics["unit"].map(lambda unit: unit_text(unit, "{}"))
     told = read_json(out / "replay.json")["provenance"]
     about, held = told["log"], told.get("fit", {}).get("held", ())
@@ -109,9 +96,11 @@ def tables(metrics: pd.DataFrame) -> tuple[Table, ...]:
 
 
 def summary(metrics: pd.DataFrame) -> str:
-    """Say whether limits are met, if there are any, and how much of the motion is explained."""
+    """Say whether limits are met, if there are any, how much of the motion is explained, and what may be done."""
     said = [explained(metrics), judged(metrics)]
-    return " ".join(filter(None, said if metrics["limit"].isna().all() else said[::-1]))
+    least = metrics.loc[metrics["metric"] == "fit", "value"].min()
+    told = said if metrics["limit"].isna().all() else said[::-1]
+    return " ".join(filter(None, [*told, NEXT_STEP if least < EXPLAINED else ""]))
 
 
 def explained(metrics: pd.DataFrame) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from crossbody import cases
 from crossbody.cases import InvalidValue, SceneError, UnknownName
 from crossbody.cases.installed import from_file
 from crossbody.cases.registry import Registry
@@ -33,11 +34,11 @@ def summary(name: str) -> str:
 
 
 def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
-    """Return a suite by its name, the one in a file of one's own (ends in .py), or that of a case that is a file.
+    """Return a suite by its name, the one in a file of one's own (ends in .py), or that of a case or robot file.
 
     Args:
         name: which.
-        fixed: parameters of a case that is a file, the same in every run.
+        fixed: parameters of a case, the same in every run.
     """
     from crossbody.cases.files.reading import SUFFIXES
 
@@ -47,12 +48,16 @@ def load(name: str, fixed: Mapping[str, Value] | None = None) -> Suite:
         from crossbody.reports.suites._of_case import suite_of
 
         return suite_of(name, fixed or {})
+    if name not in names() and name in cases.names():
+        from crossbody.reports.suites._of_case import suite_of
+
+        return suite_of(name, fixed or {})
     if fixed:
         raise InvalidValue(f"The suite {name!r} has fixed parameters: {', '.join(fixed)} cannot be given.")
     if name in SUITES:
         return SUITES[name]
     if module is None and name not in _REGISTRY.names():
-        raise UnknownName("suite", name, names())
+        raise UnknownName("suite or case", name, {*names(), *cases.names()})
     module = module or _REGISTRY.load(name)
     found = getattr(module, "SUITE", None)
     if not isinstance(found, Suite):

@@ -1,4 +1,4 @@
-"""A suite of one's own case or robot's file: other laws of its rows, pushes on its bodies, other numbers of its own."""
+"""A suite of a case or robot's file: other laws of its rows, pushes on its bodies, other numbers of its own."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from crossbody import cases
 from crossbody.cases import Case, Parameter, Value
 from crossbody.cases.loading import module
 from crossbody.reports.suites.axis import Axis, Levels, Linear, Log
-from crossbody.reports.suites.contract import Family, Suite
+from crossbody.reports.suites.contract import USUAL, Family, Suite
 
 LAW: Mapping[str, Axis] = {"a0": Log(1e2, 1e6), "a1": Log(1.0, 1e3)}
 SHORT = 0.5  # horizon of a file's runs, s
 SPREAD = 2.0  # times and part of its default that a number without bounds is drawn between
 VARIANTS = 4
+OF_FILES = ("reference:compiled", "mujoco:matched", "mujoco:as_is", "pinocchio:law")
+"""Who runs a file: MuJoCo with its own contacts, too, for it is the one that has friction."""
 
 
 def suite_of(name: str, fixed: Mapping[str, Value]) -> Suite:
-    """Return the suite of a case that is a file, with parameters that are the same in every run."""
+    """Return the suite of a case, of the library or a file, with parameters that are the same in every run."""
     families = []
     for variant in cases.variants(name)[:VARIANTS]:
         case = cases.load(name, variant, **fixed)
@@ -30,7 +32,7 @@ def suite_of(name: str, fixed: Mapping[str, Value]) -> Suite:
         families.append(Family(
             case=name, variant=variant, axes=axes, fixed=same, second=5, finishes=False, time_limit=30.0,
         ))  # fmt: skip
-    return Suite(families=tuple(families), runs=40)
+    return Suite(families=tuple(families), runs=40, engines=OF_FILES if case.file else USUAL)
 
 
 def _axes(name: str, case: Case) -> dict[str, Axis]:

@@ -41,6 +41,8 @@ class Ladder:
                 raise InvalidValue(f"Ladder.{name} is {rungs}; it must fall, and stay above 0.")
 
 
+USUAL = ("reference:compiled", "mujoco:matched", "pinocchio:law")
+"""Who runs a suite unless it or the user says otherwise."""
 TIGHT = Ladder(rtol=(1e-12,), dt=(1e-4,))
 """For scenes that multiply errors: asked for 1e-12, an error of 1e-6 is within reach, and 1e-9 not."""
 
@@ -123,7 +125,7 @@ class Suite:
     """
 
     families: tuple[Family, ...]
-    engines: tuple[str, ...] = ("reference:compiled", "mujoco:matched", "pinocchio:law")
+    engines: tuple[str, ...] = USUAL
     runs: int = 200
     about: str = ""
 

@@ -53,8 +53,47 @@ def in_words(rows: pd.DataFrame) -> str:
         told.append("; not " + "; not ".join(f"{len(own)} of {who}: {_ends(own)}" for who, own in each))
     told.append(f". {len(judged)} had a truth")
     if not math.isnan(worst := _worst(judged["error"])):
-        told.append(f", the largest error is {worst:.2g}")
+        told.append(f", the largest relative error is {worst:.2g}")
     return "".join(told) + "."
+
+
+ERROR = (
+    "An error is that of position, relative to how far the coordinates move, or the largest shift of a touch over the "
+    "horizon, if that is larger, up to the time to which the truth is known better than the run can be."
+)
+
+
+def varied(rows: pd.DataFrame) -> list[str]:
+    """Say of each suite what was varied in its runs, and from where to where."""
+    return [f"{suite}: {_varied(own['parameters'])}." for suite, own in rows.groupby("suite", sort=False)]
+
+
+def _varied(parameters: pd.Series[str]) -> str:
+    runs = pd.DataFrame([json.loads(one) for one in parameters.drop_duplicates()])
+    told = []
+    for name in runs.columns:
+        values = runs[name].dropna()
+        if values.astype(str).nunique() < 2:
+            continue
+        if pd.api.types.is_numeric_dtype(values):
+            told.append(f"{name} from {values.min():.3g} to {values.max():.3g}")
+        else:
+            told.append(f"{name} ({values.astype(str).nunique()} values)")
+    return f"varied are {', '.join(told)}" if told else "nothing is varied"
+
+
+def unrun(rows: pd.DataFrame) -> list[str]:
+    """Say which engines did not run how many times, one line a reason."""
+    gone = rows[rows["outcome"].isin([SKIPPED, REFUSED])]
+    return [
+        f"{outcome}: {', '.join(f'{who} {count}' for who, count in _who(own).items())}. {why}"
+        for (outcome, why), own in gone.groupby(["outcome", "why"], sort=False)
+    ]
+
+
+def _who(rows: pd.DataFrame) -> dict[str, int]:
+    counted = (rows["engine"] + ":" + rows["profile"]).value_counts(sort=False)
+    return {str(who): int(count) for who, count in counted.items()}
 
 
 def _ends(bad: pd.DataFrame) -> str:

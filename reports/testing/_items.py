@@ -99,7 +99,7 @@ class OneLimit(Judged):
         self.where = scene.name if scene.name.endswith(OF_USERS) else plugin.MARKER
 
     def runtest(self) -> None:
-        """Judge; within passes, a known deviation is an xfail, what there is not is a skip."""
+        """Judge; within passes, what is expected-outside is an xfail, what there is not is a skip."""
         bench = plugin.bench(self.config)
         row = self._row(bench)
         self.user_properties += [(name, str(getattr(row, name))) for name in (*TOLD, "why", "command")]

@@ -70,7 +70,7 @@ def test_a_reason_reads_alone(name: str) -> None:
 
 @pytest.mark.parametrize("name", cases.names())
 def test_a_property_that_leaves_a_stored_run_without_a_number_does_so_with_any_parameters(name: str) -> None:
-    """Where nothing is stored a missing number would be outside; of the stored run it is a known deviation."""
+    """Where nothing is stored a missing number would be outside; of the stored run it is expected-outside."""
     for variant in cases.variants(name):
         case = cases.load(name, variant)
         limits = limits_of(case)

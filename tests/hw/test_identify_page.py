@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 from study_pages import MAP
@@ -37,5 +39,32 @@ def test_white_residuals_of_a_fit_stand_beside_predictions_that_are_off_by_their
     assert rows["noise"] == pytest.approx(NOISE, rel=0.1)
     assert rows["unexplained"] > 0.5 * NOISE
     text = site.write(out).read_text(encoding="utf-8")
-    assert "Intervals: white residuals. These residuals are what the fit leaves in its windows" in text
+    assert "Intervals: white residuals." in text
+    assert "These residuals are what the fit leaves in its windows" in text
     assert "of predictions of all windows from their measured starts" in text
+    _check_left(out, angle, fit["fitted"])
+    assert "On held-out windows the rmse changed" in text
+    assert re.search(r"to [\d.]+ rad \(within its limit of growth\)\.", text)
+    case = next(out.glob("case-*.html")).read_text(encoding="utf-8")
+    assert "On held-out windows the rmse changed" in case, "its page begins as the index does"
+    assert "Nothing is judged" not in case
+
+
+def _check_left(out: Path, angle: np.ndarray, fitted: list[int]) -> None:
+    """Hold the residuals of the fit against the noise that was added, and their correlation against its formula."""
+    left = pd.DataFrame(json.loads((out / "identify-residuals.json").read_text(encoding="utf-8"))["rows"])
+    assert sorted(set(left["window"])) == sorted(fitted)
+    assert left["value"].std() == pytest.approx(NOISE, rel=0.1)
+    own = left[left["window"] == fitted[0]].sort_values("t")
+    true = solve_ivp(
+        lambda _, y: [y[1], 58.0 * np.sin(y[0]) - 0.2 * y[1]], (0.0, 6.0), [2.5, 0.0], t_eval=own["t"], rtol=1e-10,
+        atol=1e-10,
+    )  # fmt: skip
+    noise = np.interp(own["t"], np.arange(len(angle)) * 2e-3, angle) - true.y[0]
+    assert np.abs(own["value"] - noise).max() < 0.3 * NOISE, "measured less predicted is the noise itself"
+    lags = pd.DataFrame(json.loads((out / "identify-autocorrelation.json").read_text(encoding="utf-8"))["rows"])
+    parts = [one.sort_values("t")["value"].to_numpy() for _, one in left.groupby("window")]
+    products = [sum(float(r[k:] @ r[: len(r) - k]) for r in parts) for k in range(3)]
+    assert lags["lag_s"][:3].tolist() == pytest.approx([0.0, 2e-3, 4e-3])
+    assert lags["value"][1:3].tolist() == pytest.approx([x / products[0] for x in products[1:]], abs=2e-3)
+    assert (lags["value"][1:].abs() <= lags["band"][1:]).mean() > 0.9

@@ -19,9 +19,9 @@ from crossbody.hw.models.contract import Segment
 from crossbody.reports.cli import main
 from crossbody.reports.commands import replay as command
 from crossbody.reports.replay.comparison import findings, verdicts
+from crossbody.reports.replay.meanings import MEANS
 from crossbody.reports.runs import watch
 from crossbody.reports.sections.identify import sections
-from crossbody.reports.sections.replay import MEANS
 
 MODEL = ["--model", "double_pendulum", "--columns", "multiarm_double"]
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,6 +18,7 @@ from crossbody import cases
 from crossbody.cases import Outcome
 from crossbody.reference.linear import LinearModel
 from crossbody.reports.analysis import bode, figure, numbers
+from crossbody.reports.cli import main
 
 OMEGA = np.logspace(-1.0, 1.5, 80)
 
@@ -182,3 +186,28 @@ def test_poles_and_the_map_are_drawn_where_they_are(seed: int) -> None:
         np.testing.assert_allclose(read(layer["x"]), [-0.1, 0.0, 0.2])
         np.testing.assert_allclose(read(layer["y"]), [0.3, 0.5])
         np.testing.assert_allclose(read(layer["z"]).reshape(2, 3), growth.reshape(2, 3), rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_poles_at_one_point_are_counted_beside_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points = 10.0 * rng.normal(size=(5, 2))
+    counts = rng.integers(1, 12, 5)
+    poles = np.repeat(points, counts, axis=0) * (1.0 + 1e-13 * rng.normal(size=(int(counts.sum()), 2)))
+    rows = pd.DataFrame({"place": "a", "real": poles[:, 0], "imag": poles[:, 1]})
+    _, *told = figure.pole_figure(rows)["data"]  # type: ignore[index]
+    assert [text for one in told for text in one["text"]] == [f"{count} poles" for count in counts if count > 1]
+
+
+def test_the_page_of_an_analysis_has_its_values_and_poles_and_names_its_case(tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["analyse", "soft_contact", "--variant", "axis", "--out", str(tmp_path / "out"), "-q"])
+    assert not end.value.code
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert re.search(r"<h1>[^<]* of soft_contact:axis</h1>", page)
+    for stem, title in (("equilibria", "Values at the operating points"), ("poles", "Poles")):
+        rows = json.loads((tmp_path / "out" / f"analysis-{stem}.json").read_text(encoding="utf-8"))["rows"]
+        table = re.search(rf'data-csv="[^"]*-{title.replace(" ", "-")}"(.*?)</table>', page, re.DOTALL)
+        assert table, title
+        key = "value" if stem == "equilibria" else "real"
+        assert [f'data-v="{row[key]}"' in table[1] for row in rows] == [True] * len(rows)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from crossbody.cases import SceneError
@@ -14,7 +16,7 @@ from crossbody.engines.importers.beside.robot import measured
 from crossbody.reports.cli import main
 from crossbody.reports.importers.audit import of_scene, opened
 from crossbody.reports.importers.compare import FAILED, NONE, OK, UNSEEN, UNSUPPORTED, WRONG, Row, rows
-from crossbody.reports.importers.conformance import _told, audit_of, judged, written
+from crossbody.reports.importers.conformance import _told, audit_of, judged, misread, written
 
 BY_NAME = {feature.name: feature for feature in FEATURES}
 
@@ -118,3 +120,23 @@ def test_a_feature_that_there_is_not_is_one_sentence(tmp_path: Path, capsys: pyt
     assert end.value.code == 2
     assert "warp drive" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_which_reader_is_wrong_about_what_is_said_first(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows = [
+        {"feature": f"f{k}", "engine": engine, "verdict": str(rng.choice([OK, WRONG, FAILED, UNSEEN]))}
+        for k in range(12) for engine in ("one", "two")
+    ]  # fmt: skip
+    first, *lines = misread(rows)
+    good = sum(all(row["verdict"] == OK for row in rows if row["feature"] == f"f{k}") for k in range(12))
+    assert first == f"{good} of 12 features are read by all engines as the format says."
+    for engine in ("one", "two"):
+        for word in (WRONG, FAILED):
+            names = [row["feature"] for row in rows if (row["engine"], row["verdict"]) == (engine, word)]
+            told = [line for line in lines if line.startswith(f"{engine} {word}: ")]
+            assert len(told) == bool(names)
+            if names:
+                assert all(re.search(rf"\b{name}\b", told[0]) for name in names[:6])
+                assert (f"and {len(names) - 6} more" in told[0]) == (len(names) > 6)

@@ -48,6 +48,8 @@ def test_a_shell_completes_commands_and_names(words: str, wanted: str) -> None:
     ("run bouncing_ball --set-engine ", {"plain,reference.rtol=", "plain,mujoco.dt="}),
     ("run --set-engine refe", {"plain,reference.rtol=", "plain,reference.max_steps="}),
     ("run bouncing_ball -e mujoco:matched --set-engine mujoco.d", {"plain,mujoco.dt="}),
+    ("run robot.xml --law a", {"plain,a0=", "plain,a1="}),
+    ("run robot.xml --law a0=1e4,a", {"plain,a0=1e4,a1="}),
 ])  # fmt: skip
 def test_a_shell_completes_parameters_and_settings(words: str, known: set[str]) -> None:
     """Those that the command would take; of settings, those of the engines that are asked for."""

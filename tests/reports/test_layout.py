@@ -37,6 +37,24 @@ def shown(cells: Mapping[str, list[str]]) -> dict[str, list[str]]:
     return {head: column for head, column in cells.items() if set(column) - layout.NOTHING}
 
 
+@pytest.mark.parametrize("seed", range(50))
+def test_a_head_of_two_lines_ends_above_its_numbers_and_takes_no_more_room_than_its_longer_line(seed: int) -> None:
+    draw = random.Random(seed)
+    names, cells, above = drawn(draw)
+    head = "-\n".join("abcdefghij"[: draw.randrange(1, 11)] for _ in range(2))
+    numbers = [str(draw.randrange(10)) for _ in names]
+    lines = click.unstyle(layout.laid_out(names, {head: numbers, **cells}, 10000, above=above)).split("\n")
+    plain = click.unstyle(layout.laid_out(names, {"x": numbers, **cells}, 10000, above=above)).split("\n")
+    first, second = head.split("\n")
+    wide = max(map(len, (first, second)))
+    end = lines[1].index(second) + len(second)
+    assert lines[1].strip() == second
+    assert lines[0][end - wide : end].strip() == first
+    assert len(lines) == len(plain) + 1
+    own = [line for line in lines[2:] if not above or line.startswith("  ")]
+    assert [line[end - 1] for line in own] == numbers
+
+
 @pytest.mark.parametrize("seed", range(200))
 def test_no_line_is_too_wide_and_columns_go_in_order_and_whole(seed: int) -> None:
     draw = random.Random(seed)

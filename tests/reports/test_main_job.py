@@ -24,7 +24,7 @@ def result(variant: str) -> jobs.CaseResult:
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", cases.variants(CASE))
 def test_no_engine_is_outside(variant: str) -> None:
-    """Also of known deviations, whose stored sizes follow from what numbers are measured by."""
+    """Also of what is expected-outside, whose stored sizes follow from what numbers are measured by."""
     rows = study.judge([result(variant)], {result(variant).case.label: "again"})
     assert len({row["engine"] for row in rows}) > 3
     assert not [(row["engine"], row["metric"], row["value"], row["why"]) for row in rows if row["verdict"] in WRONG]

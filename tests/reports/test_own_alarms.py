@@ -277,7 +277,7 @@ def test_a_metric_that_is_blind_is_told_of_a_linkage_with_rows_that_follow_from_
 
 
 @pytest.mark.parametrize("label", ["dry_oscillator:swings", "sliding_block:rests"])
-def test_pages_of_one_engine_with_several_known_deviations_are_read_as_they_are(label: str, tmp_path: Path) -> None:
+def test_pages_of_one_engine_with_several_known_properties_are_read_as_they_are(label: str, tmp_path: Path) -> None:
     """Its name, the same in every row of a table, stood above it, and the reason was taken for the engine."""
     out = tmp_path / "out"
     done = subprocess.run(

@@ -351,7 +351,7 @@ def test_a_cell_is_the_warmer_the_farther_out(word: Word) -> None:
     assert steps == sorted(steps)
     most = 6 if word is Word.WITHIN else 12
     assert {0, most} <= set(steps) <= set(range(most + 1))
-    for none in (np.nan, np.inf):  # of a known deviation without a number nobody knows how far it is
+    for none in (np.nan, np.inf):  # of what is expected-outside without a number nobody knows how far it is
         assert heat(none) == (-1 if word is Word.EXPECTED else most)
 
 

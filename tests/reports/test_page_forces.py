@@ -136,6 +136,16 @@ def test_a_force_of_a_few_times_the_truths_is_drawn_whole(run: Trajectory, times
     assert "range" not in drawn["layout"]["yaxis"]
 
 
+def test_rows_of_friction_are_not_said_to_be_above_a_surface(run: Trajectory) -> None:
+    """They have none: a contact that is below it has tangential rows whose gap is 0."""
+    names = ["floor", "floor t1", "floor t2", "wall"]
+    wide = {name: np.repeat(getattr(run, name), 4, axis=1) for name in ("lam", "mode")}
+    gap = np.column_stack([run.gap[:, 0], 0.0 * run.gap[:, 0], 0.0 * run.gap[:, 0], np.abs(run.gap[:, 0]) + 1.0])
+    found = trace(replace(run, gap=gap, ledger=None, **wide))
+    told = note("penetration", [replace(found, about=found.about | {"contacts": names}, truth=None)])
+    assert told.endswith("Never below the surface: wall.")
+
+
 def test_rows_that_carry_nothing_are_named_and_not_drawn(run: Trajectory) -> None:
     def wide(lam: Floats) -> Trace:
         doubled = {name: np.repeat(getattr(run, name), 2, axis=1) for name in ("gap", "mode")}

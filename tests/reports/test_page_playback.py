@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import chromium
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from study_pages import page_of
 
 from crossbody.cases import Event, Mode, load
@@ -67,6 +68,25 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return page_of(case, tmp_path_factory.mktemp("playback") / "out", *given)
 
 
+@pytest.mark.parametrize(
+    ("name", "before", "after", "said"),
+    [
+        ("floor:ball", Mode.FREE, Mode.SLIP, "floor:ball touches and slips"),
+        ("floor:ball", Mode.FREE, Mode.STICK, "floor:ball touches and sticks"),
+        ("balls 0 and 1", Mode.FREE, Mode.SLIP, "balls 0 and 1 touch and slip"),
+        ("balls 0 and 1", Mode.CONTACT, Mode.BALLISTIC, "balls 0 and 1 let go below the surface"),
+        ("balls 0 and 1", Mode.FREE, Mode.CONTACT, "balls 0 and 1 touch"),
+        ("balls 0 and 1", Mode.BALLISTIC, Mode.CONTACT, "balls 0 and 1 press"),
+        ("balls 0 and 1", Mode.BALLISTIC, Mode.COLLISION, "balls 0 and 1 collide"),
+        ("floor:ball", Mode.STICK, Mode.SLIP, "floor:ball slips"),
+    ],
+)
+def test_what_happens_is_said_whole_and_of_two_in_the_plural(name: str, before: Mode, after: Mode, said: str) -> None:
+    events = (Event(t=1.0, contact=0, before=before, after=after),)
+    trace = SimpleNamespace(run=SimpleNamespace(events=events), about={"contacts": (name,)})
+    assert playback.happens(trace) == ([1.0], [said])
+
+
 STEPS = """(async (way) => {
     const find = (name) => document.querySelector(`[data-${name}]`);
     const found = [];
@@ -108,7 +128,28 @@ def test_buttons_go_through_what_happens_in_every_engine_that_is_shown_and_end(
     own = browser.js(f"{STEPS}('after')")
     assert [t for t, _ in own] == pytest.approx([t for t in truth if t > times[0]], abs=2e-4)
     browser.js("document.querySelector('[data-show-all]').click()")
+    browser.js(f"document.querySelector('[data-alone]').click(); {PICKED}('clock', 0)")
+    alone = browser.js(f"{STEPS}('after')")
+    assert [t for t, _ in alone] == pytest.approx(truth, abs=2e-4), "of the truth alone, whatever is shown"
+    assert all("fake" not in text for _, text in alone)
     assert browser.complaints() == []
+
+
+@pytest.mark.browser
+@needs_chromium
+@pytest.mark.parametrize("seed", range(3))
+def test_a_turn_is_exaggerated_about_its_own_axis(seed: int, page: Path, browser: chromium.Browser) -> None:
+    rng = np.random.default_rng(seed)
+    opened(browser, page)
+    start, turn = Rotation.random(rng=rng), rng.normal(size=3) * 0.02
+    axes = [(one * start).as_matrix().T.tolist() for one in (Rotation.identity(), Rotation.from_rotvec(turn))]
+    for factor in (1, 10, 100):
+        angle = min(factor * float(np.linalg.norm(turn)), np.pi)
+        found = np.array(browser.js(f"crossbody.solids.exaggerated({axes[0]}, {axes[1]}, {factor})"))
+        wanted = Rotation.from_rotvec(angle * turn / np.linalg.norm(turn)) * start
+        assert np.abs(found.T - wanted.as_matrix()).max() < 1e-9
+    still = np.array(browser.js(f"crossbody.solids.exaggerated({axes[0]}, {axes[0]}, 10)"))
+    assert np.abs(still - axes[0]).max() < 1e-9
 
 
 @pytest.mark.browser

@@ -11,16 +11,20 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from unpacked import numbers
 
 from crossbody import cases
 from crossbody.cases import Case, Event, Mode, Trajectory
 from crossbody.cases.mechanisms.maze.geometry import maze_of
+from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
+from crossbody.cases.scene_plain import plain
 from crossbody.engines import load
 from crossbody.reports import scenes
+from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.impulse import with_collisions
 from crossbody.reports.pages.case_page import PLOTTED
-from crossbody.reports.pages.figures import FIGURES, points_for
+from crossbody.reports.pages.figures import FIGURES, led, points_for
 from crossbody.reports.pages.html import packed_value
 from crossbody.reports.pages.playback import packed, peaks, pictures, playback
 from crossbody.reports.runs import study
@@ -376,3 +380,77 @@ def test_a_force_of_rounding_is_no_arrow(size: float) -> None:
     drawn = size > 1e-9
     assert (found["force"] > 0.0) == drawn
     assert bool(found["tracks"][0]["arrows"]["bdata"]) == drawn
+
+
+@pytest.mark.parametrize("types", [("plane", "sphere"), ("plane", "box"), ("plane", "cylinder"), ("sphere", "box"),
+                                   ("sphere", "sphere"), ("capsule", "capsule")])  # fmt: skip
+@pytest.mark.parametrize("seed", range(3))
+def test_the_whole_force_of_a_contact_has_the_power_of_all_its_rows(types: tuple[str, str], seed: int) -> None:
+    """On the second body, and as large against the first: what the equations make of multipliers and rates of rows."""
+    rng = np.random.default_rng(seed)
+    turned = Rotation.random(2, rng=rng).as_quat(scalar_first=True)
+    shapes = [
+        Shape(name=f"s{i}", body=f"b{i}", type=kind, size=tuple(rng.uniform(0.1, 0.3, 3)))
+        for i, kind in enumerate(types)
+    ]
+    pair = Pair(name="p", first="s0", second="s1", dimension=3, friction=(0.7, 0.7, 0.0, 0.0, 0.0))
+    scene = Scene(
+        bodies=tuple(Body(name=f"b{i}", mass=1.0, inertia=(0.1, 0.2, 0.25, 0.0, 0.0, 0.0)) for i in range(2)),
+        joints=tuple(Joint(name=f"j{i}", body=f"b{i}", type="free") for i in range(2)),
+        shapes=tuple(shapes), pairs=(pair,),
+    )  # fmt: skip
+    x = rng.normal(size=(2, 3))
+    q = np.concatenate([np.concatenate([at, turn]) for at, turn in zip(x, turned, strict=True)])
+    v = rng.normal(size=12)
+    case = cases.from_scene(scene, q0=q, v0=v, t_end=1.0)
+    system = equations(case)
+    assert system is not None
+    own = {"scene": plain(scene)}
+    for _ in range(3):  # until both touch, where they meet on either is one place
+        gap, _ = system.gaps_along(q[None], v[None])
+        at = scenes.load("scene").arrows(q[None], np.eye(1, gap.shape[1], 0), own)[0]
+        q[7:10] -= gap[0, 0] * at[0, 3:]
+    rates, lam = system.gaps_along(q[None], v[None])[1][0], rng.uniform(1.0, 2.0, gap.shape[1])
+    count = gap.shape[1] // 3
+    pushed = scenes.load("scene").arrows(q[None], np.repeat([[1.0, 0.0]], [count, 2 * count], axis=1), own)[0]
+    missing = np.flatnonzero(~pushed[:, 3:].any(axis=1))  # capsules that cross meet at one place alone
+    lam[[*missing, *(count + 2 * missing), *(count + 2 * missing + 1)]] = 0.0
+    arrows = scenes.load("scene").arrows(q[None], lam[None], own)[0]
+    turns = Rotation.from_quat(np.array([q[3:7], q[10:14]]), scalar_first=True)
+    spin = turns.apply(v.reshape(2, 6)[:, 3:])
+    moved = [v.reshape(2, 6)[i, :3] + np.cross(spin[i], arrows[:, :3] - q.reshape(2, 7)[i, :3]) for i in range(2)]
+    power = ((moved[1] - moved[0]) * arrows[:, 3:]).sum()
+    assert power == pytest.approx(lam @ rates, rel=1e-6, abs=1e-6)
+    assert np.abs(lam[len(arrows) :] @ rates[len(arrows) :]) > 1e-3, "of friction, too"
+
+
+def test_friction_is_drawn_of_the_instant_at_which_its_contact_presses_most() -> None:
+    rng = np.random.default_rng(8)
+    lam, ends = rng.uniform(-1.0, 1.0, (60, 4)), np.array([1, 20, 45, 60])
+    for before, end, found in zip(
+        [0, *ends[:-1]], ends, peaks(lam, ends, led(["a", "b", "a t1", "a t2"])), strict=True
+    ):
+        part = lam[before:end]
+        at = np.abs(part[:, 0]).argmax()
+        assert found.tolist() == [part[at, 0], part[np.abs(part[:, 1]).argmax(), 1], *part[at, 2:]]
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder", "capsule"])
+def test_a_mark_of_what_is_round_lies_on_it_and_no_turn_leaves_it_where_it_is(kind: str) -> None:
+    shape = Shape(name="s", body="b", type=kind, size=(0.3, 0.5, 0.0), position=(0.1, 0.2, 0.3))
+    scene = Scene(bodies=(Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),),
+                  joints=(Joint(name="j", body="b", type="free"),), shapes=(shape,))  # fmt: skip
+    (solid,) = scenes.load("scene").stage({"scene": plain(scene)}).solids
+    marks = np.concatenate([np.array(line) for line in solid["marks"]]) - [*shape.position, 0.0, 0.0, 0.0]
+    at, out = marks[:, :3], marks[:, 3:]
+    if kind == "sphere":
+        assert np.allclose(np.linalg.norm(at, axis=1), 0.3, atol=1e-4)
+        assert np.allclose(out, at / 0.3, atol=1e-3)
+    elif kind == "cylinder":
+        assert np.allclose(np.abs(at[:, 2]), 0.5)
+        assert np.allclose(out[:, 2], np.sign(at[:, 2]))
+    else:
+        assert np.allclose(np.hypot(at[:, 0], at[:, 1]), 0.3)
+    for axis in np.eye(3):
+        there = Rotation.from_rotvec(0.4 * axis).apply(at)
+        assert max(np.linalg.norm(at - one, axis=1).min() for one in there) > 0.05

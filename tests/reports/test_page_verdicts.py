@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from dataclasses import replace
 from html import unescape
@@ -17,7 +18,7 @@ from study_pages import page_of
 from crossbody.cases import load
 from crossbody.reports import metrics
 from crossbody.reports.figures.section import Section, Table, columns
-from crossbody.reports.judging.told import beyond, runs_of, sentence
+from crossbody.reports.judging.told import NEXT, beyond, runs_of, sentence
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Row, Word
 from crossbody.reports.pages import case_page, grid
@@ -47,8 +48,10 @@ def test_a_page_begins_with_the_sentence_of_its_own_rows(page: Path) -> None:
     said = sentence(runs_of(rows)).replace(" on bouncing_ball:linear", "")
     assert "fake:off" in said
     text = unescape(page.read_text())
-    lead = text[text.index('<p class="lead first">') :].partition("</p>")[0]
-    assert said in lead
+    lead = text[text.index('<p class="lead first">') :].partition("</ul>")[0]
+    lines = re.findall(r"<(?:p class=.lead first.|li)>(.*?)</(?:p|li)>", lead)
+    assert lines == said.split(NEXT)
+    assert len(lines) > 1
     assert "bouncing_ball:linear" not in lead, "which case it is stands above"
 
 

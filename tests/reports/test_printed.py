@@ -118,7 +118,7 @@ def swap(cells: dict[str, list[str]], one: str, other: str) -> None:
 PLANTED: dict[str, Callable[[pytest.MonkeyPatch], None]] = {
     "importer and step swapped": _of_table(lambda cells: swap(cells, "importer", "step")),
     "model and step swapped": _of_table(lambda cells: swap(cells, "model", "step")),
-    "within and known swapped": _of_table(lambda cells: swap(cells, "within", "known")),
+    "within and expected-outside swapped": _of_table(lambda cells: swap(cells, "within", run_shown.EXPECTED)),
     "seconds for milliseconds": _of_table(
         lambda cells: cells.update({"time [ms]": [str(1e-3 * float(x)) for x in cells["time [ms]"]]})
     ),
@@ -135,7 +135,7 @@ PLANTED: dict[str, Callable[[pytest.MonkeyPatch], None]] = {
         run_shown, "_wrong", lambda run, row: _own_wrong(run, row | {"limit": 3.0 * row["limit"]})
     ),
     "no number beyond": lambda patch: patch.setattr(run_shown, "beyond", lambda row: False),
-    "what is known counts as within": lambda patch: patch.setattr(told.EngineRun, "deviates", None),
+    "what is expected-outside counts as within": lambda patch: patch.setattr(told.EngineRun, "deviates", None),
 }  # fmt: skip
 _wrong, _own_wrong = run_shown.wrong, run_shown._wrong
 

@@ -70,10 +70,11 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
         row("c", "penetration", 1e-3, Word.INFO),  # without a limit
     ]
     text = sentence(runs_of(rows))
-    assert text.startswith("1 of 2 runs is within all limits, none is outside. Without a limit: c:matched on ball:v.")
-    assert text.endswith(
-        "cause, and not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason."
-    )
+    assert text.splitlines() == [
+        "1 of 2 runs is within all limits, 1 is beyond a limit and not judged (position up to 24 times its limit).",
+        "- Beyond a limit, not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason.",
+        "- Without a limit: c:matched on ball:v.",
+    ]
     shown = click.unstyle(run_shown.table(runs_of(rows), {}, 200)).splitlines()
     assert [shown[0].split()[-2:], *(line.split()[-2:] for line in shown[2:])] == [
         ["beyond", "outside"], ["0", "0"], ["2", "0"], ["0", "0"]
@@ -83,12 +84,27 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
     assert "24 times its limit, mostly its step" in sentence(runs_of([*rows, step]))
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_an_exit_code_that_is_0_names_what_it_does_not_count(seed: int, capsys: pytest.CaptureFixture[str]) -> None:
+    draw = np.random.default_rng(seed)
+    known, loose, within = (int(n) for n in draw.integers(0, 3, 3))
+    rows = [row("a", f"x{k}", 1.0, Word.EXPECTED, 1e-3) for k in range(known)]
+    rows += [row("a", f"y{k}", 1.0, Word.INFO, 1e-3) for k in range(loose)]
+    rows += [row("a", f"z{k}", 1.0, Word.WITHIN, 2.0) for k in range(within)]
+    run_shown.show_code(rows, 0)
+    said = " ".join(capsys.readouterr().out.split())
+    assert (f"{known} expected-outside" in said, f"{loose} beyond a limit" in said) == (known > 0, loose > 0)
+    assert said.startswith("Exit code 0: nothing is outside." if known + loose else "")
+    run_shown.show_code(rows, 1)
+    assert not capsys.readouterr().out
+
+
 def test_columns_go_before_digits_and_errors_go_last() -> None:
     rows = [row("mujoco", name, 1.23e-4, Word.INFO) for name in run_shown.SHOWN.values()]
     rows += [row("mujoco", "velocity", 1.0, Word.EXPECTED), row("mujoco", "gap_error", 1.0, Word.INFO, 1e-6)]
     times = {("ball:v", "mujoco:matched"): (12.5, 80.0)}
     shown = [
-        [head for head in (*run_shown.LEFT_OUT, "position", "outside") if head in table.splitlines()[0]]
+        [head for head in (*run_shown.LEFT_OUT, "position", "outside") if head.split()[0] in table.splitlines()[0]]
         for table in (run_shown.table(runs_of(rows), times, width) for width in range(200, 20, -1))
     ]
     assert "position" in shown[-1]
@@ -104,7 +120,7 @@ def test_the_sentence_names_who_is_off_by_how_much_and_by_which_part() -> None:
         row("mujoco", part_of("position", "step"), 1e-4, Word.INFO),
     ]  # fmt: skip
     text = sentence(runs_of(rows))
-    assert text.startswith("1 of 2 runs is within all limits.")
+    assert text.startswith("1 of 2 runs is within all limits, 1 is outside.")
     assert "mujoco:matched on ball:v (position 0.005, 50 times its limit, mostly its model)" in text
 
 
@@ -129,7 +145,7 @@ def test_a_share_of_the_whole_is_no_multiple_of_its_limit() -> None:
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_what_has_no_number_is_off_the_farthest(value: float) -> None:
     rows = [row("a", "position", 1.0, Word.OUTSIDE, 1e-9), row("b", "lam_impulse", value, Word.OUTSIDE, 1.0)]
-    assert "Off: b:matched on ball:v (lam_impulse outside); a:matched" in sentence(runs_of(rows))
+    assert "- Outside: b:matched on ball:v (lam_impulse outside).\n- Outside: a:matched" in sentence(runs_of(rows))
 
 
 def test_an_engine_that_is_absent_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -161,7 +177,7 @@ def test_a_run_that_failed_is_one_sentence_and_one_entry(why: str, capsys: pytes
     assert said.count("outside: ") == 1
     assert f"outside: ball:v mujoco:matched did not finish. {' '.join(why.split())} The report" in folded
     assert "the 2 numbers that this makes wrong; a shorter --t-end" in folded
-    assert "Off: mujoco:matched on ball:v (did not finish)." in folded
+    assert "- Outside: mujoco:matched on ball:v (did not finish)." in folded
     assert "nan W" not in said
     assert "limit nan" not in said
 

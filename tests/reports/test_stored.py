@@ -95,7 +95,7 @@ def test_numbers_come_again_of_the_same_version_and_settings_up_to_the_horizon(m
 
 @pytest.mark.parametrize("part", [0.5, 0.94, 1.0, 1.06, 2.1])
 def test_another_number_than_the_same_version_gave_is_told(part: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A known deviation is outside then, any other number a regression: a step, a setting or a metric has changed."""
+    """Outside where it is expected-outside, else a regression: a step, a setting or a metric has changed."""
     case = load("bouncing_ball", "linear")
     prepared = engines.load("mujoco").prepare(case, "default")
     made = Entry(engine="mujoco", profile="default", run=prepared.run(), settings=prepared.settings)

@@ -30,8 +30,8 @@ from crossbody.reports.suites.axis import Levels, Linear, Log, Whole, decades
 from crossbody.reports.suites.contract import Family, Ladder, Suite
 from crossbody.reports.sweep import draw
 from crossbody.reports.sweep.bounds import Overdue, bounded, overheard
-from crossbody.reports.sweep.execute import COLUMNS, Tried, _verdict, execute, row
-from crossbody.reports.sweep.map import MAP, stability_map, summary
+from crossbody.reports.sweep.execute import COLUMNS, SKIPPED, Tried, _verdict, execute, row
+from crossbody.reports.sweep.map import MAP, stability_map, summary, unrun, varied
 from crossbody.reports.sweep.measure import Asked, Error, at_the_end, error, instants, lasting, residual
 from crossbody.reports.sweep.minimise import failures, shrink
 from crossbody.reports.sweep.pools import together
@@ -739,3 +739,34 @@ def test_an_end_is_wrong_by_its_place_and_by_its_speed(q: float, v: float) -> No
     run = case.closed_form(instants(case.t_end))
     place, speed = run.q[-1] + q * np.abs(run.q).max(), run.v[-1] + v * np.abs(run.v).max()
     assert at_the_end(case, place, speed).value == pytest.approx(max(q, v), abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_was_varied_and_what_did_not_run_is_said_with_its_reason(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a0, push, why = 10.0 ** rng.uniform(0, 6, 8), rng.choice(["", "x 1", "y 2"], 8), ["No law.", "Not installed."]
+    rows = pd.DataFrame(
+        {"suite": "s", "engine": "e", "profile": f"p{k % 3}", "outcome": SKIPPED if k % 3 else "finished",
+         "why": why[k % 3 - 1] if k % 3 else "",
+         "parameters": json.dumps({"a0": a0[k], "push": str(push[k]), "t_end": 1.0})}
+        for k in range(8)
+    )  # fmt: skip
+    (said,) = varied(rows)
+    assert f"a0 from {a0.min():.3g} to {a0.max():.3g}" in said
+    assert (f"push ({len(set(push))} values)" in said) == (len(set(push)) > 1)
+    assert "t_end" not in said
+    assert unrun(rows) == [f"{SKIPPED}: e:p1 3. No law.", f"{SKIPPED}: e:p2 2. Not installed."]
+
+
+def test_a_case_of_the_library_is_a_suite_of_its_own_and_another_name_is_told(tmp_path: Path) -> None:
+    suite = suites.load("bouncing_ball", {"t_end": 0.5})
+    assert {family.case for family in suite.families} == {"bouncing_ball"}
+    assert all("a0" in family.axes and family.fixed["t_end"] == 0.5 for family in suite.families)
+    with pytest.raises(UnknownName, match=r"no suite or case 'bouncing_bal'.*Did you mean 'bouncing_ball'"):
+        suites.load("bouncing_bal")
+
+
+def test_a_file_is_run_by_the_engine_that_has_its_friction_too(tmp_path: Path) -> None:
+    ball = '<body><freejoint/><geom name="b" size=".1"/></body>'
+    (tmp_path / "ball.xml").write_text(f"<mujoco><worldbody>{ball}</worldbody></mujoco>")
+    assert "mujoco:as_is" in suites.load(str(tmp_path / "ball.xml")).engines

@@ -81,7 +81,7 @@ def test_judgement(value: float, limit: Limit | None, claim: Claim | None, word:
 def test_a_number_that_is_missing_has_one_word(
     limit: str, claimed: bool, stored: float | None, hidden: bool, case: Case, motion: Trajectory
 ) -> None:
-    """Hidden by the engine; known to be none; stored as none of a known deviation; else outside, claimed or not."""
+    """Hidden by the engine; known to be none; stored as none; else outside, claimed or not."""
     claim = Claim(metric="contacts", expected=3.0, tier=Tier.B, source="a figure")
     given = {
         "plain": {},

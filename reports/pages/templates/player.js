@@ -21,8 +21,8 @@
       return { ...track, width: track.poses.length / n, pushes: track.arrows.length / n };
     });
     const find = (name) => root.querySelector(`[data-${name}]`);
-    const [play, clock, readout, event, speed, view, forces, longer, axes, before, after, differences, whose, follow] =
-      ["play", "clock", "readout", "event", "speed", "view", "forces", "longer", "axes", "before", "after", "differences", "whose", "follow"].map(find);
+    const [play, clock, readout, event, speed, view, forces, longer, axes, before, after, differences, whose, follow, alone] =
+      ["play", "clock", "readout", "event", "speed", "view", "forces", "longer", "axes", "before", "after", "differences", "whose", "follow", "alone"].map(find);
     const canvas = root.querySelector("canvas");
     const g = canvas.getContext("2d", { alpha: false }); // what is opaque costs less to lay into the page
     let [now, running, last, said, turn, tilt, zoom] = [0, false, 0, -Infinity, 0.6, 0.35, 1];
@@ -51,13 +51,17 @@
       return { pose: mix, pushes: track.arrows.subarray(row * track.pushes, (row + 1) * track.pushes) };
     };
     const larger = (track) => (differences && lead && (!whose.value || whose.value === track.name) ? Number(differences.value) : 1);
-    // A pose with its difference to the truth's made larger: of bodies with shapes where they are, not how they are turned.
+    // A pose with its difference to the truth's made larger: of bodies with shapes also how they are turned.
     const pose = (track, t) => {
       const [mine, factor] = [at(track, t), larger(track)];
       if (factor === 1 || track === lead) return mine;
       const true_ = at(lead, t).pose;
       const moved = (k) => true_(k) + factor * (mine.pose(k) - true_(k));
-      return { ...mine, pose: (k) => (solids && k % 9 > 2 ? mine.pose(k) : moved(k)) };
+      const axes = Array.from({ length: stage.frames }, (_, body) => {
+        const [from, to] = [true_, mine.pose].map((one) => crossbody.solids.frame(one, body).axes);
+        return crossbody.solids.exaggerated(from, to, factor).flat();
+      });
+      return { ...mine, pose: (k) => (solids && k % 9 > 2 ? axes[Math.floor(k / 9)][(k % 9) - 3] : moved(k)) };
     };
     // Whose motion the view has room for: the truth's, for a run that diverged, or differences made larger, would shrink it.
     const fitted = lead ? [lead] : tracks;
@@ -313,7 +317,7 @@
     // within half a frame of it, and of all else what is within a frame is one.
     const close = 1e-9 * (end || 1);
     const instants = () => {
-      const shown = tracks.filter((track) => crossbody.shown(track.name));
+      const shown = tracks.filter((track) => (alone?.checked ? track === lead : crossbody.shown(track.name)));
       const each = (track) => track.happens[0].map((t, i) => ({ t, who: track.name, what: track.happens[1][i] }));
       const found = shown.filter((track) => track === lead).flatMap(each).map((one) => ({ t: one.t, all: [one] }));
       const rest = shown.filter((track) => track !== lead).flatMap(each).sort((a, b) => a.t - b.t).filter((one) => {
@@ -331,6 +335,7 @@
     };
     let stops = instants();
     crossbody.on("engines", () => { stops = instants(); });
+    alone?.addEventListener("change", () => { stops = instants(); redraw(); });
     const told = ({ all }) => {
       const groups = new Map();
       all.forEach(({ what, who }) => groups.set(what, (groups.get(what) || new Set()).add(who)));

@@ -60,15 +60,21 @@ crossbody.solids = (() => {
     }
   };
 
+  // A line on a body, and which of its points are not behind it: their normals, which follow them, lead to the eye.
+  const seen = (line, frame, to) => line.map((m) => {
+    const [at, out] = [to(placed(frame, m)), to(placed(frame, m.slice(0, 3).map((x, i) => x + m[3 + i])))];
+    return [at[0], at[1], out[3] <= at[3]];
+  });
+
   // Of the world: planes and shapes that stand still; of one track: its bodies.
   const paint = (g, shapes, frames, to, look) => {
     const drawn = shapes.map((solid) => {
       const points = solid.points.map((p) => to(placed(frames[solid.body] || WORLD, p)));
-      return { ...solid, points, depth: points.reduce((sum, p) => sum + p[3], 0) / points.length };
+      return { ...solid, points, marks: (solid.marks || []).map((line) => seen(line, frames[solid.body] || WORLD, to)), depth: points.reduce((sum, p) => sum + p[3], 0) / points.length };
     });
     g.strokeStyle = look.ink;
     g.fillStyle = `color-mix(in srgb, ${look.ink} 22%, ${look.paper})`;
-    for (const { points, radius, faces } of drawn.sort((a, b) => b.depth - a.depth)) {
+    for (const { points, radius, faces, marks } of drawn.sort((a, b) => b.depth - a.depth)) {
       const r = radius * points[0][2];
       const round = circle(r);
       const around = outline(r ? points.flatMap(([x, y]) => round.map(([c, s]) => [x + r * c, y + r * s])) : points);
@@ -78,11 +84,12 @@ crossbody.solids = (() => {
       g.lineJoin = r ? "miter" : "round"; // a round outline is smooth as it is
       g.lineWidth = look.width;
       g.stroke();
-      if (!faces.length) continue;
+      if (!faces.length && !marks.length) continue;
       const dashes = g.getLineDash();
       g.setLineDash([]); // edges inside an outline are thin, and dashes cost more than lines
       g.lineWidth = 0.6 * look.width;
       g.beginPath();
+      for (const line of marks) line.forEach(([x, y, shown], i) => (shown && line[i - 1]?.[2] ? g.lineTo(x, y) : g.moveTo(x, y)));
       for (const face of faces) {
         const corners = face.map((i) => points[i]);
         const area = corners.reduce((sum, p, i) => {
@@ -119,5 +126,17 @@ crossbody.solids = (() => {
     const at = placed(frame(pose, body), p);
     return [at.map((x) => x - radius), at.map((x) => x + radius)];
   });
-  return { extent, frame, grid, carried, paint, bones, axes };
+  // The axes of a body whose turn from another's is larger by a factor: about the same axis, up to half a turn.
+  const exaggerated = (from, axes, factor) => {
+    const sine = [0, 1, 2].map((i) => 0.5 * from.reduce((sum, a, k) => sum + cross(a, axes[k])[i], 0));
+    const [size, cosine] = [Math.hypot(...sine), 0.5 * (from.reduce((sum, a, k) => sum + dot(a, axes[k]), 0) - 1)];
+    const angle = Math.min(factor * Math.atan2(size, cosine), Math.PI);
+    const about = size > 0 ? sine.map((x) => x / size) : [0, 0, 1];
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    return from.map((a) => {
+      const [along, aside] = [dot(about, a), cross(about, a)];
+      return a.map((x, i) => c * x + s * aside[i] + (1 - c) * along * about[i]);
+    });
+  };
+  return { exaggerated, extent, frame, grid, carried, paint, bones, axes };
 })();
