@@ -7,7 +7,7 @@ of noise. What was left out is watched.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,8 @@ from crossbody.reference.kinds import Floats, Index
 INDEPENDENT = 1e-4  # pivot over the first from which on a row does not follow from the others
 ROUNDED = 1e-8  # below which it does, as far as rounding tells
 NOTHING = 1e-12  # m by m or rad: what no velocity moves a loop by more than is rounding
+BRANCHES = 1e-6  # of what rows bend by, by which one that others hold all along may bend otherwise: by rounding
+LOOSE = 100.0  # times the part of it that does not follow: by so much more
 OPEN, ROUNDING = 100.0, 1e-6  # times the gap of the rows that hold, and at least, m: more is not held any longer
 
 
@@ -111,6 +113,48 @@ def ranked(system: System, q: Floats, groups: Sequence[Sequence[int]]) -> Rank:
     return Rank(order=[rows[i] for i in order], pivots=pivots.tolist())
 
 
+def branching(
+    system: System, q: Floats, held: Sequence[int], out: Sequence[int], loose: Sequence[float]
+) -> list[int]:  # fmt: skip
+    """Return rows that follow from others at an assembled state and hold by themselves beside it: motions branch there.
+
+    A row that is left out bends as those that hold it do, H' v along every v with H v = 0, where they hold it all along
+    a motion. Between links that are aligned, at a dead centre, it does not.
+
+    Args:
+        system: the mechanism.
+        q: positions (nq,).
+        held: rows that hold there, independent of each other.
+        out: rows that follow from them.
+        loose: the part of each of these that does not.
+    """
+    q, (p, _) = np.array(q), started(system, np.array(q), np.zeros(system.n))
+    H = State(system, 0.0, q, np.zeros(system.n), p).H
+    free = np.linalg.svd(H[held])[2][len(held) :] if held else np.eye(system.n)
+    pairs = [(one, other) for k, one in enumerate(free) for other in free[: k + 1]]
+    bends = [State(system, 0.0, q, a + b, p).Hdv - State(system, 0.0, q, a - b, p).Hdv for a, b in pairs]
+    if not out or not bends:
+        return []
+    follows, turns = np.linalg.lstsq(H[held].T, H[out].T)[0], np.array(bends)
+    off = np.abs(turns[:, out] - turns[:, held] @ follows).max(axis=0)
+    allowed = (BRANCHES + LOOSE * np.asarray(loose)) * np.abs(turns).max()
+    return [i for i, apart in zip(out, off > allowed, strict=True) if apart]
+
+
+def dead_centre(
+    system: System, q: Floats, held: Sequence[int], out: Mapping[int, float], names: Sequence[str]
+) -> str:  # fmt: skip
+    """Return a sentence on the rows, by `names` of all, at which motions branch (`branching`); or none."""
+    if not (found := branching(system, q, held, list(out), list(out.values()))):
+        return ""
+    beside = ", ".join(repr(names[i]) for i in found)
+    return (
+        f"dead_centre: at the start the rows of loops have lost rank, as where links are aligned: {len(held)} of "
+        f"{len(held) + len(out)} hold, and beside it {beside} too. Which way the mechanism goes from there its "
+        "equations leave open; another start (--start) is none."
+    )
+
+
 def watched(system: System, run: Trajectory) -> Trajectory:
     """Return the run, or one that is inconsistent where a row that was left out is not held by the others.
 
@@ -131,11 +175,14 @@ def watched(system: System, run: Trajectory) -> Trajectory:
         if np.any(off > bound):
             k, j = np.argwhere(off > bound)[0]
             row = int(left_out[j])
+            held, loose = np.flatnonzero(system.held).tolist(), np.asarray(system.loose).tolist()
+            branches = branching(system, run.q[0], held, left_out.tolist(), loose)
+            ended = Outcome.ILL_POSED if branches else Outcome.INCONSISTENT
             message = (
                 f"Row {row} followed from the others at the start and was left out; at t = {run.t[k]:.12g} s "
-                f"it has {what} = {values[k, row]:.3g}. {Outcome.INCONSISTENT.advice}"
+                f"it has {what} = {values[k, row]:.3g}. {ended.advice}"
             )
-            return replace(run, outcome=Outcome.INCONSISTENT, message=message)
+            return replace(run, outcome=ended, message=" ".join((*system.findings, message)))
     lam, mode = np.array(run.lam), np.array(run.mode)
     lam[:, left_out], mode[:, left_out] = np.nan, Mode.BILATERAL
     count = len(left_out) + run.counts.get("redundant", 0)

@@ -83,13 +83,13 @@ def activate(s: Any, m: Model, w: Work, mode: Bytes) -> None:
     Rows that the others hold are not among them.
     """
     na, idle = 0, 0
-    follows = m.follows
+    follows, order, idle_rows, sharing = m.follows, w.order, w.idle_rows, s.sharing
     for k in range(s.nc):
-        i = w.order[k] if s.sharing else k
+        i = order[k] if sharing else k
         if follows[i] >= 0:
             mode[i] = mode[follows[i]]
         if is_active(mode[i]):
-            if w.idle_rows[i]:
+            if idle_rows[i]:
                 idle += 1
             else:
                 add_row(m, w, na, i)

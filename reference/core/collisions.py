@@ -64,11 +64,12 @@ def _touches(s: Any, m: Model, w: Work, b: Buffers, i: int) -> bool:
 @compiled
 def _choose(s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Mark the rows that take part in the next collision; the most approaching one, -1 if none approaches."""
-    first, fastest = -1, -slow(s)
+    struck, rate = w.struck, w.rate
+    first, faster = -1, -slow(s)
     for i in range(s.nc):
-        w.struck[i] = NOT
-        if w.rate[i] < fastest - (TIE if first >= 0 else 0.0) and _touches(s, m, w, b, i):
-            first, fastest = i, w.rate[i]
+        struck[i] = NOT
+        if rate[i] < faster and _touches(s, m, w, b, i):
+            first, faster = i, rate[i] - TIE
     if first < 0:
         return first
     w.struck[first] = BOUNCES
@@ -212,10 +213,11 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     and the next impulse would cross the row in the order of these gaps instead of that of the rates.
     """
     nq, still = s.nq, False
+    struck, rate, least, most = w.struck, w.rate, STILL * s.speed, slow(s)
     for i in range(s.nc):
-        w.struck[i] = NOT
-        if STILL * s.speed < abs(w.rate[i]) <= slow(s) and _touches(s, m, w, b, i):
-            w.struck[i] = STAYS
+        struck[i] = NOT
+        if least < abs(rate[i]) <= most and _touches(s, m, w, b, i):
+            struck[i] = STAYS
             still = True
     if not still or _endless(s):
         return 0

@@ -40,14 +40,15 @@ def _want(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> None:
 
     The others than the level machine pivot by least index, as a complementarity problem is solved.
     """
+    mode, struck, gap, level, touch = b.mode, w.struck, w.gap, s.fsm == LEVEL, s.touch
     for i in range(s.nc):
-        w.struck[i] = b.mode[i]
+        struck[i] = mode[i]
     for i in range(s.nc):
-        now = b.mode[i]
-        apart = s.fsm == LEVEL and now == FREE and w.gap[i] > s.touch  # most rows: they stay so
+        now = mode[i]
+        apart = level and now == FREE and gap[i] > touch  # most rows: they stay so
         if not apart and m.unilateral[i] and m.follows[i] < 0:
-            w.struck[i] = next_mode(K, s, m, w, b.mode, i)
-            if s.fsm != LEVEL and w.struck[i] != now:
+            struck[i] = next_mode(K, s, m, w, mode, i)
+            if not level and struck[i] != now:
                 return
 
 
@@ -84,8 +85,9 @@ def _pass(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     _want(K, s, m, w, b)
     if s.one_by_one and s.fsm == LEVEL:
         _keep_strongest(K, s, m, w, b)
+    mode, struck = b.mode, w.struck
     for i in range(s.nc):
-        if w.struck[i] != b.mode[i]:
+        if struck[i] != mode[i]:
             if s.frictional and is_active(b.mode[i]):
                 w.let_go[i] = s.t
             move(s, b, i, w.struck[i])

@@ -225,7 +225,7 @@ class FrictionMachine(LevelMachine):
         """Whether an open contact stands where it may press: at its surface, or below it from the start on."""
         if self.modes[i] != Mode.FREE:
             return False
-        return bool(gap[i] < -self.deep or (gap[i] <= 0.0 and rate[i] <= self.slow))
+        return bool(gap[i] < -self.deep or (gap[i] <= self._touch(q) and rate[i] <= self.slow))
 
     def _decided(self, t: float, seen: Seen, joins: set[int]) -> Tried:
         """A set of modes that agrees with its forces."""

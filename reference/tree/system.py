@@ -14,7 +14,7 @@ from crossbody.cases.scene import Body, Scene
 from crossbody.cases.scene_contacts import WAYS, contacts, rows_of
 from crossbody.reference import System
 from crossbody.reference._activations import Activations
-from crossbody.reference._redundant import ranked
+from crossbody.reference._redundant import dead_centre, ranked
 from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.tree import layout
 from crossbody.reference.tree.mechanism import velocity
@@ -126,11 +126,12 @@ def system(
     ends = np.cumsum([0, *(loop.width for loop in scene.loops)]).tolist()
     found = ranked(whole, q0, [range(a, b) for a, b in pairwise(ends)])
     count = found.held(rank)
-    finding = found.finding(count, rows_of(scene)[0])
+    names, held = rows_of(scene)[0], sorted(found.order[:count])
     out = sorted(zip(found.order[count:], found.pivots[count:], strict=True))
-    if not out and not finding:
+    told = (found.finding(count, names), dead_centre(whole, q0, held, dict(out), names))
+    if not out and not any(told):
         return whole
     return System(
         **fields, redundant=[row for row, _ in out], loose=[pivot for _, pivot in out],
-        findings=(finding,) if finding else (),
+        findings=tuple(filter(None, told)),
     )  # fmt: skip

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
-from functools import cache
-from pathlib import Path
 from types import FunctionType
 from typing import Any
 
@@ -25,11 +23,11 @@ from numba.core import types
 from numba.extending import intrinsic
 
 from crossbody.reference import code_store
+from crossbody.reference._fingerprint import Unreadable, fingerprint
 from crossbody.reference.cache import machine
 from crossbody.reference.kinds import Floats
 from crossbody.reference.tree import layout, sweeps
 
-DOUBLE = ir.DoubleType()
 ARGUMENTS = ("q", "v", "M", "f", "w")
 KEPT = (*range(layout.F_AT), *range(layout.ORIGIN_AT, layout.NODE_SCRATCH))
 """Of a node's scratch what others read: pose, velocity, acceleration and origin."""
@@ -61,7 +59,7 @@ class Recorder:
 
     def place(self, array: Any, i: int) -> Any:
         """Return where entry i of an array stands."""
-        return self.builder.gep(array, [ir.Constant(ir.IntType(64), i)], source_etype=DOUBLE)
+        return self.builder.gep(array, [ir.Constant(ir.IntType(64), i)], source_etype=ir.DoubleType())
 
     def written(self, array: Any, values: Floats) -> None:
         """Write numbers and symbols to an array; None leaves an entry as it is."""
@@ -74,7 +72,7 @@ class Recorder:
         key = (name, *args)
         if key not in self.known:
             if name in ("sin", "cos"):
-                function = self.builder.module.declare_intrinsic(f"llvm.{name}", [DOUBLE])
+                function = self.builder.module.declare_intrinsic(f"llvm.{name}", [ir.DoubleType()])
                 value = self.builder.call(function, [operand(args[0])])
             else:
                 value = getattr(self.builder, name)(*map(operand, args))
@@ -135,10 +133,9 @@ def is_number(value: Any, number: float) -> bool:
 
 def operand(value: Any) -> Any:
     """Return a number or a symbol as LLVM takes it."""
-    return value.value if isinstance(value, Symbol) else ir.Constant(DOUBLE, float(value))
+    return value.value if isinstance(value, Symbol) else ir.Constant(ir.DoubleType(), float(value))
 
 
-@cache
 def in_python(function: Any) -> Callable[..., Any]:
     """Return a kernel's function in Python, all of whose helpers are in Python too."""
     plain = function.py_func
@@ -156,7 +153,8 @@ def source(p: Floats, nq: int, nv: int) -> str:
         nv: number of velocities.
     """
     module = ir.Module("sweeps")
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(ARGUMENTS)), "sweeps")
+    kind = ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()] * len(ARGUMENTS))
+    function = ir.Function(module, kind, "sweeps")
     for argument in function.args:
         argument.add_attribute("noalias")
     at = dict(zip(ARGUMENTS, function.args, strict=True))
@@ -211,11 +209,13 @@ def compiled(text: str) -> bytes:
     return found
 
 
-@cache
 def _dependencies() -> tuple[str, ...]:
-    """Return what the code depends on beside the model: this file, the sweeps and the machine."""
-    texts = [Path(file).read_text(encoding="utf-8") for file in (__file__, sweeps.__file__, layout.__file__)]
-    return (*texts, *machine())
+    """Return what the code depends on beside the model: the functions that make it, as they are now, and the machine.
+
+    Raises:
+        Unreadable: where the sweeps were compiled before what they read changed.
+    """
+    return (fingerprint(source), fingerprint(compiled), *machine())
 
 
 def _read(p: Floats) -> Iterator[bytes]:
@@ -243,9 +243,12 @@ def compiled_sweeps(p: Floats, nq: int, nv: int, *, anew: bool) -> float:
     """
     if numba_config.DISABLE_JIT:
         return 0.0
-    key = f"sweeps-{hashlib.sha256(repr(_dependencies()).encode() + b''.join(_read(p))).hexdigest()[:32]}"
+    store = code_store.current()
+    try:
+        key = f"sweeps-{hashlib.sha256(repr(_dependencies()).encode() + b''.join(_read(p))).hexdigest()[:32]}"
+    except Unreadable:  # nobody knows what to keep it as
+        key, store = f"sweeps-{len(_LOADED)} of this process", None
     if key not in _LOADED:
-        store = code_store.current()
         data = store.read(key) if store is not None else None
         if data is None:
             if not anew:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -132,3 +134,64 @@ def test_a_tendon_turns_round_where_it_is_shortest(seed: int, solver: str) -> No
     )
     left = 0.5 * inertia * speed**2 - tendon * way - hinge * abs(ends - angle)
     assert 0.5 * inertia * found.v[-1, 0] ** 2 == pytest.approx(left, abs=1e-7 * inertia * speed**2)
+
+
+def four_bar(lengths: np.ndarray, ground: float, turned: np.ndarray) -> Scene:
+    """A chain of three links (of 1 kg each) on hinges, the end of which is pinned `ground` away from its beginning.
+
+    At rest positions it lies along x; `turned` is the axis of all hinges, which the whole stands at right angles to.
+    """
+    along = np.linalg.svd(turned[None])[2][1]
+    bodies, joints, above, reach = [], [], "", np.zeros(3)
+    for k, length in enumerate(lengths):
+        middle = tuple(0.5 * length * along)
+        bodies.append(Body(name=f"link{k}", parent=above, mass=1.0, com=middle, inertia=(0.01, 0.01, 0.01, 0, 0, 0),
+                           position=tuple(reach)))  # fmt: skip
+        joints.append(Joint(name=f"hinge{k}", body=f"link{k}", type="hinge", axis=tuple(turned)))
+        above, reach = f"link{k}", length * along
+    pin = Loop(name="pin", type="connect", first=above, second="", first_position=tuple(reach),
+               second_position=tuple(ground * along))  # fmt: skip
+    return Scene(bodies=tuple(bodies), joints=tuple(joints), loops=(pin,), gravity=tuple(3.0 * np.cross(turned, along)))
+
+
+def closed(lengths: np.ndarray, ground: float, angle: float) -> np.ndarray:
+    """Angles of the hinges of a four-bar whose first link stands at an angle, by the two circles that its pin is on."""
+    first, last = lengths[0] * np.exp(1j * angle), complex(ground)
+    between = last - first
+    size = abs(between)
+    part = (lengths[1] ** 2 - lengths[2] ** 2 + size**2) / (2.0 * size)
+    knee = first + between / size * (part + 1j * np.sqrt(lengths[1] ** 2 - part**2))
+    ways = np.angle([first, knee - first, last - knee])
+    return np.diff(ways, prepend=0.0)
+
+
+@pytest.mark.parametrize("solver", ["compiled", "cvode"])
+@pytest.mark.parametrize("seed", range(12))
+def test_links_that_start_aligned_are_at_a_dead_centre(seed: int, solver: str) -> None:
+    """Whichever of them fold back: one row more holds beside it, and a motion that leaves it is ill posed."""
+    rng = np.random.default_rng([seed, 5])
+    lengths, turned = rng.uniform(0.1, 1.0, 3), rng.normal(size=3)
+    signs = np.array([1.0, rng.choice([-1.0, 1.0]), rng.choice([-1.0, 1.0])])
+    ground, q = float(signs @ lengths), np.pi * (np.diff(signs, prepend=1.0) != 0.0)
+    scene = four_bar(lengths, ground, turned / np.linalg.norm(turned))
+    made = system(scene, case_of(scene).law, q)
+    assert "dead_centre: at the start the rows of loops have lost rank" in made.findings[0], made.findings
+    found = simulate(made, q, np.zeros(3), 1.0, solver=solver)
+    assert found.outcome is Outcome.ILL_POSED, found.message
+    assert "dead_centre" in found.message
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-8, 1e-7, 1e-6])
+@pytest.mark.parametrize("seed", range(6))
+def test_links_that_start_at_an_angle_are_at_none(seed: int, tilt: float) -> None:
+    """Rows across the plane follow from the others there too, but for a hinge that is hardly tilted, all along."""
+    rng = np.random.default_rng([seed, 6])
+    lengths, turned = np.array([0.3, 1.0, 0.8]) * rng.uniform(0.8, 1.2, 3), rng.normal(size=3)
+    ground, angle = float(rng.uniform(0.8, 1.0)), float(rng.uniform(0.2, 1.5) * rng.choice([-1.0, 1.0]))
+    scene, q = four_bar(lengths, ground, turned / np.linalg.norm(turned)), closed(lengths, ground, angle)
+    tilted = replace(scene.joints[1], axis=tuple(scene.joints[1].axis + tilt * rng.normal(size=3)))
+    scene = replace(scene, joints=(scene.joints[0], tilted, scene.joints[2]))
+    made = system(scene, case_of(scene).law, q)
+    assert len(np.asarray(made.redundant)) == 1
+    assert not [text for text in made.findings if "dead_centre" in text]
+    assert simulate(made, q, np.zeros(3), 0.05).outcome is Outcome.FINISHED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ from random_scenes import random_scene, random_state, with_own_laws
 from crossbody import cases, engines
 from crossbody.cases import Law
 from crossbody.cases.scene import Body, Joint, Scene
-from crossbody.reference import System, code_store, linear
-from crossbody.reference.tree import layout, traced
+from crossbody.reference import System, _fingerprint, code_store, linear
+from crossbody.reference.tree import layout, sweeps, traced
 from crossbody.reference.tree.system import system
 from crossbody.reference.tree.table import tabulate
 
@@ -84,7 +85,7 @@ def test_what_was_not_asked_for_is_not_compiled_and_what_was_is_kept(
     assert address(anew=True) != 0.0
     (file,) = (empty_store / "compiled").glob("sweeps-*.code")
     monkeypatch.setattr(traced, "_LOADED", {})
-    monkeypatch.setattr(traced, "compiled", lambda text: pytest.fail("compiled twice"))
+    monkeypatch.setattr(traced.llvm, "create_pass_builder", lambda *_: pytest.fail("compiled twice"))
     assert address(anew=False) != 0.0
     assert address(anew=False, mass=3.5) == 0.0
     file.write_bytes(file.read_bytes()[:-1])
@@ -99,6 +100,43 @@ def test_without_a_folder_to_keep_code_in_it_serves_the_process(
     monkeypatch.setattr(code_store, "current", lambda: None)
     assert address(anew=False) == 0.0
     assert address(anew=True) == address(anew=False) != 0.0
+
+
+def helpers() -> list[Any]:
+    """All functions that the sweeps are made of."""
+    return [one for one in vars(sweeps).values() if hasattr(one, "py_func")]
+
+
+def altered(function: Any) -> CodeType:
+    """Its code with another number or another name in it, as what was compiled from another text may have."""
+    code = function.__code__
+    consts = tuple(2.0 * c if type(c) is float else c for c in code.co_consts)
+    if consts == code.co_consts:
+        return code.replace(co_varnames=(*code.co_varnames[:-1], f"{code.co_varnames[-1]}_"))
+    return code.replace(co_consts=consts)
+
+
+@pytest.mark.parametrize("helper", helpers(), ids=lambda one: one.__name__)
+def test_code_of_other_bytecode_is_none_of_what_was_kept(helper: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever text stands beside it: an old .pyc may run, or a function that was changed since it was read."""
+    before = traced._dependencies()
+    monkeypatch.setattr(helper.py_func, "__code__", altered(helper.py_func))
+    assert traced._dependencies() != before
+    monkeypatch.undo()
+    assert traced._dependencies() == before
+
+
+@pytest.mark.parametrize("compiled_before", [False, True])
+def test_code_that_reads_another_number_is_made_anew(
+    empty_store: Path, compiled_before: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where general code was compiled before, it has the old number for good: what has the new one is not kept."""
+    before = address(anew=True)
+    monkeypatch.setattr(layout, "ARMATURE", layout.ARMATURE + 1)
+    if compiled_before:
+        monkeypatch.setattr(_fingerprint, "changed", lambda _: True)
+    assert address(anew=True) not in (before, 0.0)
+    assert len(list((empty_store / "compiled").glob("sweeps-*.code"))) == 2 - compiled_before
 
 
 def test_a_run_and_a_derivative_are_the_same_with_either() -> None:
