@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from crossbody.cases.control import Control
     from crossbody.cases.files.case import Given
     from crossbody.cases.scene import Scene
-    from crossbody.cases.trajectory import Event, Ledger, Mode, Switch, Trajectory
+    from crossbody.cases.trajectory import Acts, Event, Ledger, Mode, Switch, Trajectory
 
 REGISTRY = Registry("case", "crossbody.cases.library", group=__name__)
 _LAZY = {
@@ -49,10 +49,11 @@ _LAZY = {
         ("Case", "Chaos", "Claim", "Coordinate", "Inputs", "Law", "Limit", "Parameter", "Tier", "Value"), "case"
     ),
     "Control": "control",
-    **dict.fromkeys(("Event", "Ledger", "Mode", "Switch", "Trajectory"), "trajectory"),
+    **dict.fromkeys(("Acts", "Event", "Ledger", "Mode", "Switch", "Trajectory"), "trajectory"),
 }
 
 __all__ = [
+    "Acts",
     "Case",
     "CaseUnsupported",
     "Chaos",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats, distinct
-from crossbody.cases.splines import spline
+from crossbody.cases.splines import integral, spline
 from crossbody.cases.trajectory import Trajectory
 
 CROSSINGS = 3
@@ -44,11 +44,8 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
     """
     width = [run.q.shape[1], run.v.shape[1], run.gap.shape[1], run.lam.shape[1], 2]
     columns = np.concatenate([run.q, run.v, run.gap, run.lam, run.energy], axis=1)
-    twice = run.t[1:] == run.t[:-1]
-    cuts = np.flatnonzero(twice | (run.mode[1:] != run.mode[:-1]).any(axis=1)) + 1
-    smooth = bool(len(cuts)) or bool((run.mode >= 0).any())
-    pieces = list(zip([0, *cuts], [*cuts, len(run.t)], strict=True))
-    starts = np.array([run.t[a] for a, _ in pieces])
+    parts, smooth = _smooth(run)
+    starts = np.array([run.t[a] for a, _ in parts])
 
     def at(times: Floats) -> Trajectory:
         times = np.asarray(times, dtype=np.float64)
@@ -57,14 +54,46 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
         which = np.clip(np.where(again, right, left), 0, None)
         out = np.empty((len(times), columns.shape[1]))
         for i in distinct(which):
-            a, b = pieces[i]
-            stop = min(b + 1, len(run.t)) if b < len(run.t) and run.t[b] > run.t[b - 1] else b
-            out[which == i] = _piece(run.t[a:stop], columns[a:stop], times[which == i], smooth)
+            some = _upto(run, *parts[i])
+            out[which == i] = _piece(run.t[some], columns[some], times[which == i], smooth)
         q, v, gap, lam, energy = np.split(out, np.cumsum(width)[:-1], axis=1)
-        modes = np.array([run.mode[pieces[i][0]] for i in which], dtype=np.int8).reshape(len(times), -1)
+        modes = np.array([run.mode[parts[i][0]] for i in which], dtype=np.int8).reshape(len(times), -1)
         return replace(run, t=times, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, ledger=None)
 
     return at
+
+
+def integrals(run: Trajectory, values: Floats) -> Callable[[Floats], Floats]:
+    """Return what gives, at times (m,), the integrals (m, k) since the start of values (n, k) at the samples.
+
+    Of the splines of the same smooth pieces, so that steps of a sixth of a pulse leave 1e-5 of its impulse.
+    """
+    parts, smooth = _smooth(run)
+    some = [_upto(run, *part) for part in parts]
+    ends = np.array([run.t[one.stop - 1] for one in some])
+    whole = [_integral(run.t[one], values[one], run.t[[one.stop - 1]], smooth)[0] for one in some]
+    before = np.cumsum([np.zeros(values.shape[1]), *whole], axis=0)
+
+    def at(times: Floats) -> Floats:
+        which = np.clip(np.searchsorted(ends, times), 0, len(ends) - 1)
+        found = before[which]
+        for i in distinct(which):
+            found[which == i] += _integral(run.t[some[i]], values[some[i]], times[which == i], smooth)
+        return found
+
+    return at
+
+
+def _smooth(run: Trajectory) -> tuple[list[tuple[int, int]], bool]:
+    """Return samples at which smooth pieces begin and those behind their ends, and whether splines join them."""
+    twice = run.t[1:] == run.t[:-1]
+    cuts = np.flatnonzero(twice | (run.mode[1:] != run.mode[:-1]).any(axis=1)) + 1
+    return list(zip([0, *cuts], [*cuts, len(run.t)], strict=True)), bool(len(cuts)) or bool((run.mode >= 0).any())
+
+
+def _upto(run: Trajectory, first: int, behind: int) -> slice:
+    """Return the samples of a piece, with the one behind it at which its mode has changed."""
+    return slice(first, behind + (behind < len(run.t) and run.t[behind] > run.t[behind - 1]))
 
 
 def multipliers(run: Trajectory) -> Floats | None:
@@ -74,6 +103,18 @@ def multipliers(run: Trajectory) -> Floats | None:
     cuts = np.linspace(0.0, 1.0, PARTS, endpoint=False)
     inside = run.t[:-1, None] + np.diff(run.t)[:, None] * cuts
     return np.concatenate([run.lam, between(run)(distinct(inside)).lam])
+
+
+def _integral(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
+    """Return integrals (m, k) from the first sample of a piece to times (m,), by a spline or trapezoids."""
+    keep = np.append(True, np.diff(t) > 0.0)
+    t, values = t[keep], values[keep]
+    if len(t) == 1:
+        return np.zeros((len(times), values.shape[1]))
+    if smooth:
+        return integral(t, values, times)
+    sums = np.cumsum(0.5 * np.diff(t)[:, None] * (values[1:] + values[:-1]), axis=0)
+    return np.stack([np.interp(times, t, np.append(0.0, column)) for column in sums.T], axis=1)
 
 
 def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:

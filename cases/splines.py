@@ -6,6 +6,7 @@ de Boor, A Practical Guide to Splines (1978), chapter IV: the slopes at the samp
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats
 
@@ -14,20 +15,41 @@ FEW = 48
 
 
 def spline(t: Floats, values: Floats, times: Floats) -> Floats:
-    """Return a spline at other times (m, k); a parabola through three samples.
+    """Return a spline at other times (m, k); a parabola through three samples, a line through two.
 
     Args:
-        t: increasing (n,), n > 2.
+        t: increasing (n,), n > 1.
         values: at them (n, k).
         times: (m,); beyond the ends the first or last cubic goes on.
     """
-    slopes = _slopes(t, values)
-    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
-    h, s = (t[i + 1] - t[i])[:, None], (times - t[i])[:, None]
-    chord, x = (values[i + 1] - values[i]) / h, s / h
-    bend = slopes[i] + slopes[i + 1] - 2.0 * chord
-    found: Floats = values[i] + s * (slopes[i] + x * ((chord - slopes[i] - bend) + x * bend))
+    i, h, slopes, rest, bend = _cubics(t, values, times)
+    s = (times - t[i])[:, None]
+    x = s / h[i]
+    found: Floats = values[i] + s * (slopes[i] + x * (rest[i] + x * bend[i]))
     return found
+
+
+def integral(t: Floats, values: Floats, times: Floats) -> Floats:
+    """Return the integral of the same spline from the first sample to other times (m, k)."""
+    i, h, slopes, rest, bend = _cubics(t, values, times)
+
+    def upto(s: Floats, of: NDArray[np.intp] | slice) -> Floats:
+        x = s / h[of]
+        found: Floats = s * (values[:-1][of] + s * (slopes[of] / 2.0 + x * (rest[of] / 3.0 + x * bend[of] / 4.0)))
+        return found
+
+    whole = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(upto(h, slice(None)), axis=0)])
+    return whole[i] + upto((times - t[i])[:, None], i)
+
+
+def _cubics(t: Floats, values: Floats, times: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats]:
+    """Return in which step times are (m,), and of each step length, slope, and coefficients of its square and cube."""
+    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+    h = np.diff(t)[:, None]
+    chord = np.diff(values, axis=0) / h
+    slopes = _slopes(t, values) if len(t) > 2 else np.repeat(chord, 2, axis=0)
+    bend = slopes[:-1] + slopes[1:] - 2.0 * chord
+    return i, h, slopes[:-1], chord - slopes[:-1] - bend, bend
 
 
 def _slopes(t: Floats, values: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,19 @@ class Mode(IntEnum):
     """In contact with friction, and held by it."""
     SLIP = 7
     """In contact with friction, and sliding."""
+
+
+class Acts(StrEnum):
+    """When what a sample tells of multipliers acts."""
+
+    AT = "at"
+    """At its instant; samples tell both sides of every jump."""
+    GRID = "grid"
+    """At its instant; between samples multipliers may jump."""
+    BEFORE = "before"
+    """Over the step that ends there, as its mean: an impulse of a time step over its length."""
+    BEHIND = "behind"
+    """Over the step that begins there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +115,7 @@ class Trajectory:
         v (n, nv): velocities.
         gap (n, nc): signed gaps, m; negative penetrates.
         lam (n, nc): multipliers, N; positive pushes apart. NaN where the engine cannot tell.
+        acts: when lam of a sample acts, so that its impulse is known.
         energy (n, 2): kinetic and potential energy, J.
         mode (n, nc): `Mode` of every row; -1 where the engine has no such notion.
         events: transitions in order of time.
@@ -137,6 +151,7 @@ class Trajectory:
     lam: Floats
     energy: Floats
     mode: Bytes
+    acts: Acts = Acts.AT
     events: tuple[Event, ...] = ()
     switches: tuple[Switch, ...] = ()
     outcome: Outcome = Outcome.FINISHED
@@ -156,6 +171,7 @@ class Trajectory:
     def __post_init__(self) -> None:
         """Check every shape once and make every array read-only."""
         instance("Trajectory.outcome", self.outcome, Outcome, "an Outcome")
+        instance("Trajectory.acts", self.acts, Acts, "an Acts")
         object.__setattr__(self, "t", frozen("Trajectory", "t", self.t, (None,)))
         n = len(self.t)
         object.__setattr__(self, "gap", frozen("Trajectory", "gap", self.gap, (n, None)))

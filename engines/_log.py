@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Event, Mode, Outcome, Switch, Trajectory
+from crossbody.cases import Acts, Event, Mode, Outcome, Switch, Trajectory
 from crossbody.cases.arrays import Floats
 
 Observe = Callable[[Floats, Floats], tuple[Floats, Floats]]
@@ -27,6 +27,7 @@ class Log:
         events: transitions, in order.
         switches: changes of discrete variables, in order.
         aside_s: wall time in which nothing was integrated, s, but told of what is inside of steps.
+        acts: when the multipliers of an instant act.
         follows: index of the row whose mode each one shares, which has no events of its own; -1 for none.
     """
 
@@ -37,6 +38,7 @@ class Log:
         self.events: list[Event] = []
         self.switches: list[Switch] = []
         self.aside_s = 0.0
+        self.acts = Acts.AT
         self.follows: Sequence[int] = ()
 
     def add(self, t: float, q: Floats, v: Floats, lam: Any, mode: Modes) -> None:
@@ -78,6 +80,7 @@ class Log:
             v=v,
             gap=gap,
             lam=np.reshape(np.array(self.lam), gap.shape),
+            acts=self.acts,
             energy=energy,
             mode=np.reshape(np.array(self.mode, np.int8), gap.shape),
             events=tuple(self.events),

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from crossbody.cases import Case, Event, Mode, Outcome, Parameter, Trajectory
+from crossbody.cases import Acts, Case, Event, Mode, Outcome, Parameter, Trajectory
 from crossbody.cases import closed_forms as cf
 from crossbody.cases.arrays import Bytes, Floats
 from crossbody.cases.brent import brent
@@ -215,7 +215,7 @@ class Steps:
         place = f"t = {t[-1]:g} s, q = {q[-1].tolist()}, v = {v[-1].tolist()}"
         return Trajectory(
             t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode, events=events(t, mode),
-            outcome=outcome, message="" if outcome.ok else f"{place}: {what}.",
+            acts=Acts.BEFORE, outcome=outcome, message="" if outcome.ok else f"{place}: {what}.",
             steps=len(t) - 1, wall_s=wall_s,
         )  # fmt: skip
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from crossbody.cases import Case, Mode, Outcome, Trajectory
+from crossbody.cases import Acts, Case, Mode, Outcome, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import WAYS, Contact
@@ -152,6 +152,7 @@ class RubbingRun(Run):
     def run(self) -> Trajectory:
         """Step from the start."""
         log = Log()
+        log.acts = Acts.BEFORE
         self.acting.reset()
         start = perf_counter()
         outcome, message = self._steps(log)

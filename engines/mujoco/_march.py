@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crossbody.cases import Mode, Outcome
+from crossbody.cases import Acts, Mode, Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.cases.brent import brent
 from crossbody.cases.control import NotFinite
@@ -160,6 +160,18 @@ def integrator(model: Any, data: Any) -> Callable[[], None]:
     return partial(mujoco.mj_implicit, model, data)
 
 
+def acts(model: Any, followed: bool) -> Acts:
+    """Return when forces act that are evaluated at the end of every step: over the next one, but in Runge-Kutta's.
+
+    Args:
+        model: with its integrator.
+        followed: whether samples tell both sides of every jump.
+    """
+    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+        return Acts.BEHIND
+    return Acts.AT if followed else Acts.GRID
+
+
 class March:
     """One run from the start of the scene.
 
@@ -187,6 +199,8 @@ class March:
         if instants and instants[0] == 0.0 and not self._change(instants.pop(0)):
             return
         self.now = self._settled(scene.modes())
+        always_on = all(mode == Mode.BILATERAL for mode in self.now)
+        self.tape.acts = acts(scene.model, always_on or self.locator is not None)
         self.tape.switch(0.0, tuple(m if m == Mode.BILATERAL else int(Mode.FREE) for m in self.now), self.now)
         self.tape.record(scene.lam(), self.now)
         if why := scene.lost():

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from crossbody.cases import Mode, Outcome
+from crossbody.cases import Acts, Mode, Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.engines._log import Log, Modes
 from crossbody.engines._machines import first_modes
@@ -92,6 +92,7 @@ class TimeStepper:
         """Step from (q0, v0) to t_end, s; lam is the impulse of the step before over its length."""
         t, q, v = 0.0, np.array(q0), np.array(v0)
         modes = first_modes(self.rows)
+        self.log.acts = Acts.BEFORE
         theta = 1.0 if BILATERAL in modes else 0.5
         self.log.add(t, q, v, self.none, modes)
         while t_end - t > 1e-9 * dt:

@@ -26,10 +26,10 @@ from crossbody.reports.sources import SHOWN, code
 Found = tuple[str, float, tuple[float, float], str]
 KINDS = (
     "judging.known_answers", "judging.known_sides", "judging.known_touches", "judging.known_sources",
-    "judging.known_growth", "judging.known_parts", "judging.known_steps", "judging.known_tables",
-    "judging.known_equations", "judging.known_sentences", "judging.known_clocks", "pages.known_pages",
-    "judging.known_verdicts", "judging.known_audits", "judging.known_arithmetic", "judging.known_samples",
-    "judging.known_places",
+    "judging.known_impulses", "judging.known_growth", "judging.known_parts", "judging.known_steps",
+    "judging.known_tables", "judging.known_equations", "judging.known_sentences", "judging.known_clocks",
+    "pages.known_pages", "judging.known_verdicts", "judging.known_audits", "judging.known_arithmetic",
+    "judging.known_samples", "judging.known_places",
 )  # fmt: skip
 OF_FILES = ("judging.known_files", "judging.known_margins")
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""

@@ -181,10 +181,10 @@ def _multipliers(made: MadeUp) -> Answers:
     idle = _idle(exact)
     off, most = float(np.abs(run.lam[:k] - exact.lam[:k]).max()), float(np.abs(exact.lam[:k]).max())
     mine, theirs = integrals(run.t, run.lam)[:k], integrals(made.t[:k], exact.lam[:k])
-    total = float(np.abs(mine[-1] - theirs[-1]).max()) / max(float(np.abs(theirs[-1]).max()), idle * made.case.t_end)
     for found, motion in ((mine, run), (theirs, exact)):
         for event in motion.events:
             found[motion.t[:k] > event.t, event.contact] += event.impulse
+    total = float(np.abs(mine[-1] - theirs[-1]).max()) / max(float(np.abs(theirs[-1]).max()), idle * made.case.t_end)
     path = float(np.abs(mine - theirs).max()) / max(float(np.abs(theirs).max()), idle * made.case.t_end)
     return {
         "lam_error": None if opens.any() else off / max(most, idle), "lam_impulse": total, "lam_impulse_path": path,

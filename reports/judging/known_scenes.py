@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from crossbody.cases import Case, Mode, Trajectory
+from crossbody.cases import Acts, Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape
@@ -34,7 +34,7 @@ LITTLE = 1e-6
 def wrong() -> tuple[Found, ...]:
     """Return metric or audit, number, least and most, and of what, where it is another one."""
     return (
-        *unlike_by((_ball,), "equations", "a ball, which ends in", EXACT, 0.0),
+        *unlike_by((_ball, _held), "equations", "a ball, which ends in", EXACT, 0.0),
         *unlike((_forces,), "audit", "an engine, which ends in"),
     )
 
@@ -94,6 +94,23 @@ def _ball() -> Iterator[Asked]:
     yield from said(
         {"law_residual": float(worst / np.abs(law[closed]).max())}, "a ball that slips or flies", (truth, some),
         _floor(),
+    )  # fmt: skip
+
+
+def _held() -> Iterator[Asked]:
+    """Ask for impulse and work of friction that is told as means over steps."""
+    truth = replace(_motion(SEED), acts=Acts.BEHIND)
+    run = replace(_motion(SEED + 1), t=truth.t, acts=Acts.BEFORE)
+    impulses, works = np.zeros((SAMPLES, 2)), np.zeros(SAMPLES)
+    for i in range(1, SAMPLES):
+        impulses[i], works[i] = impulses[i - 1], works[i - 1]
+        for sign, motion, k in ((1.0, run, i), (-1.0, truth, i - 1)):
+            pushed = sign * (truth.t[i] - truth.t[i - 1]) * motion.lam[k, 1:]
+            impulses[i] += pushed
+            works[i] += pushed @ (motion.v[i - 1, :2] + motion.v[i, :2]) / 2.0
+    yield from said(
+        {"friction_impulse": float(np.abs(impulses).max()), "friction_work": float(np.abs(works).max())},
+        "a ball that slips in steps", (truth, run), _floor(),
     )  # fmt: skip
 
 

@@ -139,13 +139,6 @@ def off_bound(run: Trajectory, case: Case) -> float:
     return float(np.max(np.abs(off), initial=0.0, where=slides))
 
 
-def cumulated(run: Trajectory, values: Floats) -> Floats:
-    """Return the integrals (n, ...) of values (n, ...) over time since the start, by the trapezoidal rule."""
-    steps = np.diff(run.t).reshape(-1, *[1] * (values.ndim - 1))
-    pieces: Floats = 0.5 * steps * (values[1:] + values[:-1])
-    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(pieces, axis=0)])
-
-
 def turned(run: Trajectory, case: Case) -> tuple[tuple[int, float, bool], ...]:
     """Return every change of a motion, as `changes` tells them; none without friction."""
     found = rubbing(run, case)

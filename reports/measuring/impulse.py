@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crossbody.cases import Mode
+from crossbody.cases import Acts, Mode
 from crossbody.cases.arrays import Floats
+from crossbody.cases.between import integrals
 from crossbody.cases.trajectory import Event, Trajectory
 
 SAME = 1e-7  # part of the horizon within which a sample and a collision are at one instant
@@ -21,42 +22,90 @@ def away(exact: Trajectory, instants: Sequence[float], t_end: float) -> NDArray[
     return np.min(nearest, axis=0) > SAME * t_end if nearest else np.ones(len(exact.t), dtype=bool)
 
 
+def cumulated(run: Trajectory, values: Floats, along: Floats | None = None) -> Floats:
+    """Return the integrals (n, k) since the start of what acts as lam of a run does.
+
+    By the trapezoidal rule; of means over steps by what they are. Over a step of constant force velocities change
+    evenly, so that its work is exact with the mean of those at both ends.
+
+    Args:
+        run: its instants, and when lam acts.
+        values: what acts (n, k).
+        along: velocities (n, k) along which it does, for its work.
+    """
+    steps = np.diff(run.t)[:, None]
+    if run.acts in (Acts.AT, Acts.GRID):
+        product = values if along is None else values * along
+        pieces = 0.5 * steps * (product[1:] + product[:-1])
+    else:
+        held = values[1:] if run.acts == Acts.BEFORE else values[:-1]
+        pieces = steps * (held if along is None else held * 0.5 * (along[1:] + along[:-1]))
+    return np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(pieces, axis=0)])
+
+
 def cumulative(run: Trajectory) -> Floats:
-    """INT lam dt by the trapezoidal rule (n, nc), N s."""
-    pieces = 0.5 * np.diff(run.t)[:, None] * (run.lam[1:] + run.lam[:-1])
-    return np.concatenate([np.zeros((1, run.lam.shape[1])), np.cumsum(pieces, axis=0)])
+    """Return INT lam dt (n, nc), N s."""
+    return cumulated(run, run.lam)
 
 
 def with_collisions(run: Trajectory, events: Sequence[Event]) -> Floats:
-    """The same with the impulses of collisions that took no time (n, nc), N s.
+    """Return the same with the impulses of collisions that took no time (n, nc), N s.
 
     Args:
         run: its multipliers; of several samples at the instant of a collision the last is behind it.
         events: those of the motion, in the run's time.
     """
-    total = cumulative(run)
+    return collided(run.t, cumulative(run), events)
+
+
+def collided(t: Floats, total: Floats, events: Sequence[Event]) -> Floats:
+    """Return impulses (n, nc) at instants (n,), s, with those of collisions that took no time up to there."""
+    total = total.copy()
     for event in events:
         if event.impulse:
-            first, behind = (int(np.searchsorted(run.t, event.t, side=side)) for side in ("left", "right"))
+            first, behind = (int(np.searchsorted(t, event.t, side=side)) for side in ("left", "right"))
             total[max(first, behind - 1) :, event.contact] += event.impulse
     return total
 
 
-def true_impulse(run: Trajectory, exact: Trajectory, whole: Trajectory) -> Floats:
-    """Return the cumulative impulse of the truth beside samples of a run (m, nc), N s.
+def counts_itself(run: Trajectory, whole: Trajectory) -> bool:
+    """Whether the samples of a run are too few for the forces of a truth, which is then integrated over its own.
 
-    By the same rule over the same samples, so that the error of the rule cancels. A run whose collisions take no
-    time has too few samples for the forces of a truth whose collisions take some: there the truth's own count.
+    Those of steps in time, whose forces act over a step, and those of collisions that take no time, where the truth's
+    take some.
+    """
+    return run.acts != Acts.AT or (
+        any(event.impulse for event in run.events) and not any(event.impulse for event in whole.events)
+    )
+
+
+Signal = Callable[[Trajectory], tuple[Floats, Floats | None]]
+"""What acts in a motion (n, k), and along which velocities if its work is asked for."""
+
+
+def beside(run: Trajectory, exact: Trajectory, whole: Trajectory, signal: Signal) -> Floats:
+    """Return the integrals of a truth beside samples of a run (m, k).
+
+    Over the same samples by the same rule, so that the error of the rule cancels; over its own where `counts_itself`.
 
     Args:
-        run: whose collisions may take no time.
+        run: what the truth is beside.
         exact: the truth at its samples.
         whole: the truth at its own.
+        signal: what is integrated.
     """
-    if not any(event.impulse for event in run.events) or any(event.impulse for event in whole.events):
-        return with_collisions(exact, whole.events)
-    own = with_collisions(whole, whole.events)
-    return np.stack([np.interp(exact.t, whole.t, row) for row in own.T], axis=1)
+    if not counts_itself(run, whole):
+        return cumulated(exact, *signal(exact))
+    whole = _held(whole, 1 + np.flatnonzero(stopping(whole)[1:]))
+    values, along = signal(whole)
+    if whole.acts == Acts.AT:
+        return integrals(whole, values if along is None else values * along)(exact.t)
+    return np.stack([np.interp(exact.t, whole.t, one) for one in cumulated(whole, values, along).T], axis=1)
+
+
+def true_impulse(run: Trajectory, exact: Trajectory, whole: Trajectory) -> Floats:
+    """Return the cumulative impulse of the truth `beside` samples of a run (m, nc), N s, with its collisions."""
+    return collided(exact.t, beside(run, exact, whole, lambda motion: (motion.lam, None)), whole.events)
 
 
 def stopping(run: Trajectory) -> NDArray[np.bool_]:

@@ -59,7 +59,7 @@ def summary(name: str) -> str:
 def _together() -> Mapping[str, tuple[str, str]]:
     """Return the functions of the modules that hold several, each with its module and what it measures."""
     found: dict[str, tuple[str, str]] = {}
-    for module in (*_OF_RUNS, "_contacts", "_energies", "_motions", "_multipliers"):
+    for module in (*_OF_RUNS, "_contacts", "_energies", "_impulses", "_motions", "_multipliers"):
         text = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
         for node in ast.parse(text).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
@@ -90,9 +90,7 @@ def _among_others(name: str) -> Metric:
     own = import_module(f"{__name__}.{module}")
     if module not in _OF_RUNS:
         return OfModule(getattr(own, name), UNIT=own.UNITS.get(name, "1"), NEEDS=own.NEEDS.get(name, ""))
-    how = {own.KINDS.get(name, "number"): getattr(own, name)}
-    metric = CaseMetric(doc=doc, unit=own.UNITS.get(name, "1"), always=own.ALWAYS, **how)
-    return OfCase(metric, jumps=own.ALWAYS)
+    return OfCase(CaseMetric(doc=doc, unit=own.UNITS.get(name, "1"), always=own.ALWAYS, number=getattr(own, name)))
 
 
 def of(case: Case) -> Mapping[str, Metric]:

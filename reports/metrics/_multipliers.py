@@ -11,13 +11,13 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases.contacts import CLOSED
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.friction import directed, rubbing
-from crossbody.reports.measuring.impulse import away, before_stops, cumulative, told, true_impulse, with_collisions
+from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.placed import largest, of_rows
 from crossbody.reports.measuring.scale import idle
-from crossbody.reports.measuring.truth import Truth, before
+from crossbody.reports.measuring.truth import Truth
 
 UNITS: dict[str, str] = {}
-NEEDS = dict.fromkeys(("complementarity", "lam_error", "lam_impulse", "lam_impulse_path"), "lam")
+NEEDS = dict.fromkeys(("complementarity", "lam_error"), "lam")
 
 
 def complementarity(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -66,51 +66,3 @@ def lam_error(truth: Truth, run: Trajectory, case: Case) -> float | None:
     scale = max(scale, idle(truth.trajectory)) if scale else 0.0
     off = np.abs(run.lam[inside] - exact.lam)
     return largest(off, run.t[inside], of_rows(case, "N", "N m"), scale) if scale else None
-
-
-def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Total impulse of the multipliers against the truth's, over the truth's.
-
-    Max over rows of |INT lam dt - INT lam_truth dt| / max over rows of |INT lam_truth dt|; NaN where lam is
-    unknown. Rows that carry nothing are measured by what is `idle`. Both integrals take the same samples by
-    the same rule, so that the error of the rule cancels. Collisions that take no time have no lam and do not
-    count: beside them a compliant truth has samples too few for its own integral.
-    """
-    inside, exact = aligned(truth, run, case)
-    if not inside.any():
-        return None
-    if np.isnan(run.lam).any():
-        return math.nan
-    run, exact = before_stops(run, exact)
-    mine, theirs = cumulative(run)[inside][-1], cumulative(exact)[-1]
-    scale = float(np.max(np.abs(theirs), initial=0.0))
-    least = idle(truth.trajectory) * case.t_end
-    off, end = np.abs(mine - theirs)[None], run.t[inside][-1:]
-    return largest(off, end, of_rows(case, "N s", "N m s"), max(scale, least)) if scale else None
-
-
-def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
-    """Cumulative impulse of the multipliers against the truth's, over the total impulse.
-
-    Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time
-    included. Releases are matched too, as lam jumps there: a sample on the wrong side would count for half
-    its step. At the instant at which a slip stops its friction may have any direction: the sample before counts
-    there. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
-    known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
-    many; N s where only the run's does. Nothing is compared behind where slips are too slow to tell their friction.
-    """
-    run = before(run, truth.firm) if truth.firm < math.inf else run
-    inside, exact = aligned(truth, run, case, releases=True)
-    if not inside.any() or truth.trajectory.counts.get("redundant", 0):
-        return None
-    if np.isnan(run.lam).any():
-        return math.nan
-    run, exact = before_stops(run, exact)
-    theirs = true_impulse(run, exact, truth.trajectory)
-    scale = float(np.max(np.abs(theirs), initial=0.0))
-    smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
-    smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
-    off = np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth]
-    scale = max(scale, idle(truth.trajectory) * case.t_end) if scale else 0.0
-    found = largest(off, run.t[inside][smooth], of_rows(case, "N s", "N m s"), scale or 1.0)
-    return found if scale else found or None

@@ -25,16 +25,10 @@ class OfModule:
 
 
 class OfCase:
-    """A metric that a case brings along.
+    """A metric that a case brings along."""
 
-    Args:
-        own: the metric.
-        jumps: whether its signal jumps where lam does: releases, and changes from stick to slip,
-            are matched too.
-    """
-
-    def __init__(self, own: CaseMetric, jumps: bool = False) -> None:
-        self.own, self.jumps, self.UNIT, self.CLAIMED = own, jumps, own.unit, not own.always
+    def __init__(self, own: CaseMetric) -> None:
+        self.own, self.UNIT, self.CLAIMED = own, own.unit, not own.always
 
     def measure(self, truth: Truth, run: Trajectory, case: Case) -> float | None:
         """Return the number, or None where the run cannot tell."""
@@ -44,7 +38,7 @@ class OfCase:
         if own.signal is not None:
             if (values := own.signal(run, case)) is None:
                 return None
-            inside, exact = aligned(truth, run, case, releases=self.jumps)
+            inside, exact = aligned(truth, run, case)
             theirs = own.signal(exact, case)
             if theirs is None:
                 return None

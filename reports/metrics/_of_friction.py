@@ -5,15 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from crossbody.cases import Case, Mode, Trajectory
-from crossbody.cases.arrays import Floats
-from crossbody.reports.measuring.friction import cumulated, directed, rubbing, sliding
+from crossbody.reports.measuring.friction import directed, rubbing, sliding
 
-UNITS = {
-    "creep_speed": "m/s", "friction_angle": "rad", "friction_impulse": "N s", "friction_power": "W",
-    "friction_work": "J",
-}  # fmt: skip
-KINDS = {"friction_impulse": "signal", "friction_work": "signal"}
-"""How a function is compared with the truth's, as in `CaseMetric`; the others are numbers of the run alone."""
+UNITS = {"creep_speed": "m/s", "friction_angle": "rad", "friction_power": "W"}
 ALWAYS = True
 
 
@@ -47,20 +41,8 @@ def friction_angle(run: Trajectory, case: Case) -> float | None:
     return float(2.0 * np.arcsin(0.5 * np.linalg.norm(off, axis=-1)).max())
 
 
-def friction_impulse(run: Trajectory, case: Case) -> Floats | None:
-    """Impulse of friction of every pair of shapes since the start, against the truth's."""
-    found = rubbing(run, case)
-    return None if found is None else cumulated(run, found.of_pairs(found.force)).reshape(len(run.t), -1)
-
-
 def friction_power(run: Trajectory, case: Case) -> float | None:
     """Largest power that friction of a pair of shapes supplies: zero if it opposes the slip."""
     if (found := rubbing(run, case)) is None:
         return None
     return float(np.max(found.of_pairs(np.sum(found.force * found.slip, axis=-1)), initial=0.0))
-
-
-def friction_work(run: Trajectory, case: Case) -> Floats | None:
-    """Work of friction of every pair of shapes since the start, against the truth's."""
-    found = rubbing(run, case)
-    return None if found is None else cumulated(run, found.of_pairs(np.sum(found.force * found.slip, axis=-1)))

@@ -13,7 +13,6 @@ UNITS = {
     "fifth_exit": "s", "final_gap": "m", "final_lam": "N", "separation_gap": "m",
 }  # fmt: skip
 """Of those that are no counts and no ratios."""
-KINDS: dict[str, str] = {}
 ALWAYS = False
 
 

@@ -9,7 +9,7 @@ import csv
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.errors import OwnFault
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Row
-from crossbody.reports.measuring.alignment import aligned, clock
+from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.apart import errors
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.jobs import CaseResult
@@ -186,7 +186,7 @@ def _read(found: Trace, run: Trajectory, trace: Trace) -> Iterator[str]:
     for field in fields(Trajectory):
         if field.name not in NOT_KEPT and not _equal(getattr(found.run, field.name), getattr(run, field.name)):
             yield f"{field.name}, as it is read"
-    for name in SIGNALS:
+    for name in ("t", *SIGNALS):
         if not _equal(getattr(found.truth, name, None), getattr(trace.truth, name, None)):
             yield f"{name} of the truth beside it"
 
@@ -200,6 +200,8 @@ def _beside(found: Trace, run: Trajectory, result: CaseResult) -> Iterator[str]:
         yield "whether there is a truth beside it"
     if found.truth is None:
         return
+    if not _equal(found.truth.t[inside], exact.t):
+        yield "the clock of the truth beside it"
     many = SIDES * sum(event.t <= result.truth.trusted for event in result.truth.trajectory.events)
     for name in SIGNALS:
         mine, wanted = getattr(found.truth, name), getattr(exact, name)
@@ -233,8 +235,7 @@ def _errors(found: Trace, first: Trace, result: CaseResult, judged: Sequence[Row
     touches, scales = case.law.touches, np.array(first.about["gap_scales"])
     gaps = np.abs(found.run.gap - found.truth.gap) / np.where(scales > 0.0, scales, 1.0)
     known = ~np.isnan(found.truth.q).all(axis=1)
-    beside = replace(found.truth, t=clock(truth, found.run, case))
-    positions = errors(truth, found.run, beside, case)[0] / np.array(first.about["scales"])
+    positions = errors(truth, found.run, found.truth, case)[0] / np.array(first.about["scales"])
     apart = {"position": positions, "gap_error": gaps[known][:, touches]}
     for row in judged:
         if row["metric"] in apart and (row["engine"], row["profile"]) == (entry.engine, entry.profile):

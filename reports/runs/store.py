@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from crossbody.cases import Event, Ledger, LogFormatError, Mode, Outcome, OutputError, Trajectory
+from crossbody.cases import Acts, Event, Ledger, LogFormatError, Mode, Outcome, OutputError, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.hw.budget import Budget, opening
 from crossbody.hw.guard import plain_allocator
@@ -61,14 +61,14 @@ def save(path: Path, trace: Trace) -> None:
     run = trace.run
     data = {"t": run.t} | _arrays(run)
     if trace.truth is not None:
-        data |= _arrays(trace.truth, "truth_")
+        data |= {"truth_t": trace.truth.t} | _arrays(trace.truth, "truth_")
     if run.ledger is not None:
         data |= _columns("work", run.ledger.contact) | {"input": run.ledger.input, "loss": run.ledger.dissipated}
     about = {
         "about": dict(trace.about),
         "events": [[e.t, e.contact, int(e.before), int(e.after), e.impulse] for e in run.events],
         "outcome": run.outcome.value, "message": run.message, "steps": run.steps, "wall_s": run.wall_s,
-        "counts": dict(run.counts), "control_s": run.control_s,
+        "counts": dict(run.counts), "control_s": run.control_s, "acts": run.acts,
     }  # fmt: skip
     columns = {name: _column(values) for name, values in data.items()}
     table = pa.table(columns, metadata={_KEY: json.dumps(about, default=as_plain).encode()})
@@ -102,7 +102,7 @@ def _blocks(data: pa.Table) -> dict[str, Floats]:
 
 
 def _motion(blocks: Mapping[str, Floats], prefix: str = "") -> Trajectory:
-    t = blocks["t"][:, 0]
+    t = blocks.get(f"{prefix}t", blocks["t"])[:, 0]
     none = np.zeros((len(t), 0))
     q, v, gap, lam, energy, mode = (blocks.get(prefix + name, none) for name in _ARRAYS)
     return Trajectory(t=t, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=mode.astype(np.int8))
@@ -213,6 +213,7 @@ def _loaded(path: Path) -> Trace:
         _motion(blocks), ledger=_ledger(blocks), events=tuple(_event(*given) for given in about["events"]),
         outcome=Outcome(about["outcome"]), message=about["message"], steps=about["steps"],
         wall_s=about["wall_s"], counts=about["counts"], control_s=float(about.get("control_s", 0.0)),
+        acts=Acts(about.get("acts", Acts.AT)),
     )  # fmt: skip
     truth = _motion(blocks, "truth_") if "truth_q" in blocks else None
     return Trace(about=about["about"], run=run, truth=truth)

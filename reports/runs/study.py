@@ -229,7 +229,7 @@ def _beside(truth: Truth, run: Trajectory, case: Case) -> Trajectory | None:
         return whole
 
     return Trajectory(
-        t=run.t, q=put(exact.q), v=put(exact.v), gap=put(exact.gap), lam=put(exact.lam),
+        t=put(exact.t[:, None])[:, 0], q=put(exact.q), v=put(exact.v), gap=put(exact.gap), lam=put(exact.lam),
         energy=put(exact.energy),
         mode=np.where(inside[:, None], np.nan_to_num(put(exact.mode.astype(np.float64))), -1).astype(np.int8),
     )  # fmt: skip

@@ -17,8 +17,7 @@ from crossbody.reports.judging.truth import agreement, truth_of
 from crossbody.reports.measuring import scale
 from crossbody.reports.measuring.alignment import clock
 from crossbody.reports.measuring.equations import equations
-from crossbody.reports.measuring.friction import cumulated
-from crossbody.reports.measuring.impulse import cumulative
+from crossbody.reports.measuring.impulse import cumulated, cumulative
 from crossbody.reports.measuring.modes import violated
 from crossbody.reports.measuring.scale import RESTS
 from crossbody.reports.measuring.truth import Truth, before, from_run, sample_times

@@ -1,0 +1,127 @@
+"""Impulses and work of forces against the truth's: every function is a metric.
+
+Of a run whose samples follow what forces do, the truth is integrated over the same samples by the same rule, so that
+the error of the rule cancels; releases are matched too, and changes between stick and slip, as lam jumps there. Steps
+in time (`Trajectory.acts`) tell no more than the impulse of each step: it is held against the truth's own integral,
+at instants that are matched as for velocities.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from crossbody.cases import Case, Trajectory
+from crossbody.cases.arrays import Floats
+from crossbody.reports.measuring.alignment import aligned
+from crossbody.reports.measuring.friction import Rubbing, rubbing
+from crossbody.reports.measuring.impulse import (
+    Signal,
+    away,
+    before_stops,
+    beside,
+    counts_itself,
+    cumulated,
+    true_impulse,
+    with_collisions,
+)
+from crossbody.reports.measuring.placed import Placed, largest, of_rows
+from crossbody.reports.measuring.scale import idle
+from crossbody.reports.measuring.truth import Truth, before
+
+UNITS = {"friction_impulse": "N s", "friction_work": "J"}
+NEEDS = dict.fromkeys(("friction_impulse", "friction_work", "lam_impulse", "lam_impulse_path"), "lam")
+
+
+def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Total impulse of the multipliers against the truth's, over the truth's.
+
+    Max over rows of |INT lam dt - INT lam_truth dt| / max over rows of |INT lam_truth dt|, collisions that take no
+    time included; NaN where lam is unknown. Rows that carry nothing are measured by what is `idle`.
+    """
+    inside, exact = aligned(truth, run, case)
+    if not inside.any():
+        return None
+    if np.isnan(run.lam).any():
+        return math.nan
+    if not counts_itself(run, truth.trajectory):
+        run, exact = before_stops(run, exact)
+    mine, theirs = with_collisions(run, run.events)[inside][-1:], true_impulse(run, exact, truth.trajectory)[-1:]
+    scale = float(np.max(np.abs(theirs), initial=0.0))
+    least = idle(truth.trajectory) * case.t_end
+    named = of_rows(case, "N s", "N m s")
+    return largest(np.abs(mine - theirs), run.t[inside][-1:], named, max(scale, least)) if scale else None
+
+
+def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Cumulative impulse of the multipliers against the truth's, over the total impulse.
+
+    Max over t and rows of |INT_0^t lam - INT_0^t lam_truth| / total impulse, collisions that take no time
+    included. At the instant at which a slip stops its friction may have any direction: the sample before counts
+    there. Instants of collisions that take no time are left out, as in `velocity`. NaN where lam is not
+    known; None where nothing presses, or where rows depend on each other and multipliers are one choice of
+    many; N s where only the run's does. Nothing is compared behind where slips are too slow to tell their friction.
+    """
+    run = before(run, truth.firm) if truth.firm < math.inf else run
+    own = counts_itself(run, truth.trajectory)
+    inside, exact = aligned(truth, run, case, releases=not own)
+    if not inside.any() or truth.trajectory.counts.get("redundant", 0):
+        return None
+    if np.isnan(run.lam).any():
+        return math.nan
+    if not own:
+        run, exact = before_stops(run, exact)
+    theirs = true_impulse(run, exact, truth.trajectory)
+    scale = float(np.max(np.abs(theirs), initial=0.0))
+    smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
+    smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
+    off = np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth]
+    scale = max(scale, idle(truth.trajectory) * case.t_end) if scale else 0.0
+    found = largest(off, run.t[inside][smooth], of_rows(case, "N s", "N m s"), scale or 1.0)
+    return found if scale else found or None
+
+
+def friction_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Impulse of friction of every pair of shapes since the start, against the truth's."""
+
+    def pushes(motion: Trajectory) -> tuple[Floats, None]:
+        found = _rubbing(motion, case)
+        return found.of_pairs(found.force).reshape(len(motion.t), -1), None
+
+    return None if rubbing(run, case) is None else _apart(truth, run, case, pushes, "N s")
+
+
+def friction_work(truth: Truth, run: Trajectory, case: Case) -> float | None:
+    """Work of friction of every pair of shapes since the start, against the truth's."""
+    found = rubbing(run, case)
+    if found is None:
+        return None
+
+    def works(motion: Trajectory) -> tuple[Floats, Floats]:
+        places = _rubbing(motion, case)
+        return places.force.reshape(len(motion.t), -1), places.slip.reshape(len(motion.t), -1)
+
+    def of_pairs(works: Floats) -> Floats:
+        return found.of_pairs(works.reshape(len(works), len(found.rows), -1).sum(axis=-1))
+
+    return _apart(truth, run, case, works, "J", of_pairs)
+
+
+def _rubbing(motion: Trajectory, case: Case) -> Rubbing:
+    found = rubbing(motion, case)
+    assert found is not None
+    return found
+
+
+def _apart(
+    truth: Truth, run: Trajectory, case: Case, signal: Signal, unit: str, of: Callable[[Floats], Floats] = np.asarray
+) -> Placed | None:
+    """Return the largest difference of what integrals of a signal come to."""
+    inside, exact = aligned(truth, run, case, releases=not counts_itself(run, truth.trajectory))
+    if not inside.any():
+        return None
+    mine, theirs = cumulated(run, *signal(run))[inside], beside(run, exact, truth.trajectory, signal)
+    off = np.abs(of(mine - theirs)).max(axis=1, initial=0.0)
+    return largest(off, run.t[inside], [("", unit)])
