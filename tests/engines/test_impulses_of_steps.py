@@ -85,3 +85,16 @@ def test_every_method_of_first_order_tells_the_force_of_the_next_step(integrator
     assert run.acts == (Acts.GRID if integrator == "RK4" else Acts.BEHIND)
     off = np.abs(cumulative(run)[:, 0] - momentum(run)[:, 0]).max() / momentum(run)[:, 0].max()
     assert off < (0.2 if integrator == "RK4" else 1e-9)
+
+
+@pytest.mark.parametrize("variant", ["linear", "resting"])
+@pytest.mark.parametrize(
+    "who", [("mujoco", "default"), ("pinocchio", "admm"), ("dart", "matched"), ("pymunk", "matched")]
+)
+def test_impulses_of_a_bouncing_ball_are_what_its_momentum_gained(who: tuple[str, str], variant: str) -> None:
+    case = cases.load("bouncing_ball", variant, t_end=1.0)
+    run = ran(who, case)
+    assert run.acts in (Acts.BEFORE, Acts.BEHIND)
+    mass = float(case.parameters["mass"])
+    gained = mass * (run.v[:, 0] - run.v[0, 0] + float(case.parameters["gravity"]) * run.t)
+    np.testing.assert_allclose(cumulative(run)[:, 0], gained, atol=1e-9 * np.abs(gained).max())
