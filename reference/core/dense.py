@@ -184,18 +184,20 @@ def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array, lef
 
 
 @compiled
-def _respond(s: Any, m: Model, w: Work, t: float, of_gaps: bool) -> None:
-    """Leave in w.la what moves the rows that follow a law of their own to their gaps, or rates, a time t into a step.
+def _off_laws(s: Any, m: Model, w: Work, t: float, of_gaps: bool) -> float:
+    """Leave in w.r by how much gaps, or rates, are off their laws a time t into a step; what part of forces that is.
 
-    Gaps follow it whatever friction does to the loads, and what sticks decays. A row that slides has no such law.
+    Gaps follow their laws whatever friction does to the loads, and what sticks decays. A row that slides has none.
     """
+    most = 0.0
     for j in range(s.na):
         i = w.idx[j]
         a0, a1 = w.law[i, 0], w.law[i, 1]
         h, hd = exact.linear_arc(a0, a1, w.gaps[0, i], w.rates[0, i] - m.drift[i], t)
         off = (h - w.ha[j] if a0 > 0.0 else 0.0) if of_gaps else hd - w.hda[j]
         w.r[j] = 0.0 if is_tangent(m, i) and w.slides[i] else off
-    ask(RESPOND, s, m, w, NOTHING)
+        most = max(most, (a0 if of_gaps else a1) * abs(w.r[j]) / max(w.scale[j], 1e-300))
+    return float(most)
 
 
 @compiled
@@ -210,12 +212,15 @@ def put_on_rubbing_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Ar
     for _ in range(CORRECTIONS - 1):
         if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t_old + t, q, v, GENERAL) != 0:
             return
-        _respond(s, m, w, t, True)
+        if _off_laws(s, m, w, t, False) + _off_laws(s, m, w, t, True) <= tolerated(s):
+            return
+        ask(RESPOND, s, m, w, NOTHING)
         if s.has_velocity:
             _shift(K, s, m, w, s.t_old + t, q)
         else:
             push_rows(m, w, s.na, w.la, 1.0, q)
-        _respond(s, m, w, t, False)
+        _off_laws(s, m, w, t, False)
+        ask(RESPOND, s, m, w, NOTHING)
         push_rows(m, w, s.na, w.la, 1.0, v)
 
 
