@@ -116,6 +116,7 @@ class CompiledRun:
             "affine": system.affine and options.shortcuts and not system.frictional,
             "implicit": options.implicit, "natural": natural,
             "ledger": self.nz > 0, "audited": self.nz > 0 and _books_everything(system),
+            "judged": options.ledger,
             "frictional": system.frictional, "dry": np.count_nonzero(system.dry),
             "friction_code": friction_code() if system.frictional else 0,
             "instant_code": instant_code(),

@@ -189,10 +189,11 @@ def _switch(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
 
 @compiled
 def _audit(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
-    """Close the energy account of all, and that of touches with friction."""
+    """Close the energy account of all, and that of touches with friction; it is judged where it was asked for."""
     if s.frictional:
         touches.follow(s, m, w, b.mode)
-    return int(audit.account(K, s, m, w))
+    code = int(audit.account(K, s, m, w))
+    return code if s.judged else 0
 
 
 @compiled

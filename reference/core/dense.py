@@ -9,6 +9,7 @@ from crossbody.reference.core import bogacki, dop853, esdirk, exact
 from crossbody.reference.core.acceleration import GENERAL, OWN, accelerate, push_rows
 from crossbody.reference.core.algebra import solve_schur
 from crossbody.reference.core.dop853 import powers
+from crossbody.reference.core.friction import NOTHING, RESPOND, ask, is_tangent
 from crossbody.reference.core.layout import EXACT, EXPLICIT, IMPLICIT, SHORT, Model, Work
 from crossbody.reference.kinds import Array
 
@@ -43,7 +44,7 @@ def _powers_inside(K: Any, s: Any, m: Model, w: Work) -> int:
     for j in range(3):
         theta = 0.25 * (j + 1)
         t = s.t_old + theta * s.hs
-        if with_rows(K, s, m, w, theta, t, w.ys) != 0:
+        if with_rows(K, s, m, w, theta, t, w.ys, False) != 0:
             return 1
         powers(K, s, m, w, t, w.ys[: s.nq], w.ys[s.nq :], INSIDE + j)
     return 0
@@ -183,9 +184,55 @@ def put_on_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array, lef
 
 
 @compiled
-def with_rows(K: Any, s: Any, m: Model, w: Work, theta: float, t: float, out: Array) -> int:
-    """Out = (q, v) at the part theta of the step, the time t, and leave the multipliers there; 1 if ill posed."""
+def _off_laws(s: Any, m: Model, w: Work, t: float, of_gaps: bool) -> float:
+    """Leave in w.r by how much gaps, or rates, are off their laws a time t into a step; what part of forces that is.
+
+    Gaps follow their laws whatever friction does to the loads, and what sticks decays. A row that slides has none.
+    """
+    most = 0.0
+    for j in range(s.na):
+        i = w.idx[j]
+        a0, a1 = w.law[i, 0], w.law[i, 1]
+        h, hd = exact.linear_arc(a0, a1, w.gaps[0, i], w.rates[0, i] - m.drift[i], t)
+        off = (h - w.ha[j] if a0 > 0.0 else 0.0) if of_gaps else hd - w.hda[j]
+        w.r[j] = 0.0 if is_tangent(m, i) and w.slides[i] else off
+        most = max(most, (a0 if of_gaps else a1) * abs(w.r[j]) / max(w.scale[j], 1e-300))
+    return float(most)
+
+
+@compiled
+def put_on_rubbing_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
+    """Move out = (q, v) likewise where some rows have friction: at the end of an implicit step, and where it is told.
+
+    What is watched is not moved: where forces that stick or slide reach their bounds all of a step's own stages count.
+    """
+    if theta == 0.0 or not long_for_rows(s) or s.loops or not exact.is_linear(s, w):
+        return
+    q, v, t = out[: s.nq], out[s.nq :], theta * s.hs
+    for _ in range(CORRECTIONS - 1):
+        if accelerate(K.dynamics, K.rows, K.solve, s, m, w, s.t_old + t, q, v, GENERAL) != 0:
+            return
+        if _off_laws(s, m, w, t, False) + _off_laws(s, m, w, t, True) <= tolerated(s):
+            return
+        ask(RESPOND, s, m, w, NOTHING)
+        if s.has_velocity:
+            _shift(K, s, m, w, s.t_old + t, q)
+        else:
+            push_rows(m, w, s.na, w.la, 1.0, q)
+        _off_laws(s, m, w, t, False)
+        ask(RESPOND, s, m, w, NOTHING)
+        push_rows(m, w, s.na, w.la, 1.0, v)
+
+
+@compiled
+def with_rows(K: Any, s: Any, m: Model, w: Work, theta: float, t: float, out: Array, told: bool) -> int:
+    """Out = (q, v) at the part theta of the step, the time t, and leave the multipliers there; 1 if ill posed.
+
+    Where they are `told`, and not for a sum alone, they are no further off than at the ends of the step.
+    """
     state(s, m, w, theta, out)
+    if told and s.frictional and s.na > 0:
+        put_on_rubbing_rows(K, s, m, w, theta, out)
     if s.na > 0 and not put_on_rows(K, s, m, w, theta, out, tolerated(s)):
         return int(accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, out[: s.nq], out[s.nq :], OWN))
     return 0

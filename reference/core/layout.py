@@ -69,7 +69,8 @@ STATE = np.dtype(
         ("implicit", "i8"),
         ("natural", "i8"),
         ("ledger", "i8"),
-        ("audited", "i8"),  # the energy account is judged
+        ("audited", "i8"),  # the energy account is closed at every step,
+        ("judged", "i8"),  # and ends a run where it stays open
         ("sharing", "i8"),  # some rows may depend on each other and share a load
         ("loops", "i8"),  # rows that are always on, by the general algebra: they may lose rank on the way
         ("keep_events", "i8"),

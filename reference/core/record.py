@@ -81,7 +81,7 @@ def _inside(K: Any, s: Any, m: Model, w: Work, mode: Bytes, t: float, out: Float
     """Append the state at a time inside the step."""
     theta = min(max((t - s.t_old) / s.hs, 0.0), 1.0)
     dense.prepare(K, s, m, w)
-    dense.with_rows(K, s, m, w, theta, t, w.ys)
+    dense.with_rows(K, s, m, w, theta, t, w.ys, True)
     scatter(s, w, w.lam)
     z = w.z
     if s.ledger and s.method != EXACT:

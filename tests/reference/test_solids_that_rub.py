@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from crossbody.cases import Mode, Outcome
-from crossbody.cases.scene import Body, Joint, Scene, Shape
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene, Shape
 
 RADIUS, SIDE = 0.1, 0.3
 HALVES = (0.5, 0.4, SIDE)
@@ -164,3 +164,42 @@ def test_a_capsule_rocks_on_another_across_it() -> None:
     assert found.q[:, 2] == pytest.approx(height, abs=1e-8)
     assert 0.5 * inertia * found.v[:, 3] ** 2 + G * height == pytest.approx(G * z, abs=1e-8)
     assert th.min() < -0.29
+
+
+TURNED = 100.0
+"""Times the tolerance to which loads are known: those of a body that turns follow from where it has turned to."""
+
+
+def egg(rng: np.random.Generator) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """A heavy ellipsoid that lies on stiff ground, slides and begins to rock."""
+    half, mass = rng.uniform(0.08, 0.2, 3), rng.uniform(0.5, 2.0)
+    inertia = mass * (np.sum(half**2) - half**2) / 5.0
+    law, mu = RowLaw(a0=1e6, a1=4e3), float(rng.uniform(0.2, 0.6))
+    scene = Scene(
+        bodies=(Body(name="b", mass=mass, inertia=(*map(float, inertia), 0.0, 0.0, 0.0)),),
+        joints=(Joint(name="free", body="b", type="free"),),
+        shapes=(
+            Shape(name="floor", type="plane"),
+            Shape(name="b", body="b", type="ellipsoid", size=tuple(map(float, half))),
+        ),
+        pairs=(pair("floor", "b", mu, law),),
+    )  # fmt: skip
+    return (
+        scene,
+        np.array([0.0, 0.0, half[2], 1.0, 0.0, 0.0, 0.0]),
+        np.array([0.8, 0.3, 0.0, *rng.uniform(0.5, 2.0, 3)]),
+    )
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7])
+@pytest.mark.parametrize("seed", range(4))
+def test_multipliers_of_stiff_rows_with_friction_are_known_as_motions_are(seed: int, rtol: float) -> None:
+    """At the ends of steps and between them: a gap that a long step knows to the tolerance would put them off by a0."""
+    scene, q, v = egg(np.random.default_rng([seed, 61]))
+    ends = np.unique(run(scene, q, v, 0.2, rtol=rtol).t)
+    times = np.unique(np.r_[ends, 0.5 * (ends[1:] + ends[:-1])])
+    found, exact = (run(scene, q, v, 0.2, rtol=one, samples=times) for one in (rtol, 1e-12))
+    events = np.array([0.0, *(event.t for event in exact.events)])
+    clear = np.abs(times[:, None] - events).min(axis=1) > 5e-3  # there either side counts
+    assert found.counts["implicit_steps"] > 20
+    assert np.abs(found.lam - exact.lam)[clear, 0].max() <= TURNED * rtol * np.abs(exact.lam).max()
