@@ -93,4 +93,7 @@ def _nearest(row: Row) -> float:
 
 
 def _words(row: Row) -> str:
-    return f"{row['engine']}:p on made_up:a ({row['metric']} {row['value']:.2g}, {_times(row):.2g} times its limit"
+    times = f"{_times(row):.2g}"
+    if _times(row) >= 10.0:  # up to 1e5, in plain digits
+        times = f"{int(float(times)):,}"
+    return f"{row['engine']}:p on made_up:a ({row['metric']} {row['value']:.2g}, {times} times its limit"

@@ -161,7 +161,7 @@ def sentence(runs: Sequence[EngineRun]) -> str:
         lines += _listed(said, [_off(run, run.first) for run in off if run.who.startswith(TRUTH) == of_truth])
     remedies = [remedy(run.who, run.rows, row["metric"]) for run, row in loose]
     told = (f"{one}. {does}" if does else one for one, does in zip(_caused(loose), remedies, strict=True))
-    lines += _listed("Beyond a limit, not judged", list(told))
+    lines += _listed("Beyond, not judged", list(told))
     lines += _listed("Expected-outside, the largest", _caused(_largest(known)) if known else [])
     lines += _listed("Without a limit", [f"{run.who} on {run.label}" for run in all_ran if not run.judged])
     return NEXT.join(lines)
@@ -190,7 +190,7 @@ def _are(count: int) -> str:
 def _up_to(some: Deviating) -> list[str]:
     """Say which number that runs are named for is how many times its limit, at most; nothing where none has one."""
     found = max(((share(row), row["metric"]) for _, row in some if math.isfinite(share(row))), default=None)
-    return [f"{found[1]} up to {found[0]:.2g} times its limit"] if found else []
+    return [f"{found[1]} up to {in_times(found[0])} its limit"] if found else []
 
 
 def _listed(head: str, texts: Sequence[str]) -> list[str]:
@@ -243,6 +243,12 @@ def _short(row: Row) -> tuple[str, str]:
     return (said[1], said[2]) if said else ("", "")
 
 
+def in_times(factor: float) -> str:
+    """Say a factor in two digits: "16,000 times"."""
+    plain = 10.0 <= factor < 1e7
+    return f"{float(f'{factor:.2g}'):,.0f} times" if plain else f"{factor:.2g} times"
+
+
 def _first(texts: Sequence[str]) -> list[str]:
     """The first texts, and how many more there are."""
     more = [f"and {len(texts) - NAMED} more"] if len(texts) > NAMED else []
@@ -257,7 +263,7 @@ def _off(run: EngineRun, row: Row) -> str:
     size = row["verdict"]
     if math.isfinite(times):
         number = row.get("where") or f"{row['value']:.2g}{unit_text(row.get('unit', ''))}"
-        size = f"{number}, {times:.2g} times its limit"
+        size = f"{number}, {in_times(times)} its limit"
     if row.get("unit") == "%" and math.isfinite(times):  # a share of the whole is no multiple of what it may lack
         size = f"{row['value']:.3g} %, where {valid(row['expected'], row['limit'])} % is valid"
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"

@@ -24,7 +24,7 @@ ROUNDING = 1e-12
 LACKS = "The run lacks this number, which the truth has."
 NOT_MEASURED = "Not measured. "
 """How the reason begins why a part of an error is not known."""
-UNMEASURED = "Known, but its size has not been measured here: "
+UNMEASURED = "Known, but no size of it is stored to judge this by: "
 """How the reason of a number begins that is beyond its limit, nobody knows how far it may be."""
 IDENTITIES = frozenset(
     {

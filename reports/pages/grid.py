@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from crossbody.reports import metrics
-from crossbody.reports.judging.parts import PARTS, part_of
+from crossbody.reports.judging.parts import LARGEST, PARTS, part_of
 from crossbody.reports.judging.told import FINISHED, WRONG, beyond, distance, lacking, runs_of, share, telling
 from crossbody.reports.judging.verdict import Row, Word, by
 from crossbody.reports.layout import bounded, unit_text
@@ -23,8 +23,9 @@ RANKED = (*WORST[:2], Word.INFO.value, *WORST[2:])
 """Words of runs, the worst first: one that is not judged is beyond some limit for a known cause."""
 FARTHEST, NEAREST = 12, 6
 """Decades that are told apart beyond a limit, and within it."""
-SHARES = tuple(part_of("position", part) for part in PARTS)
-"""Parts of the worst error of position: they stand in the table of a case although nothing judges them."""
+SHARES = (*(part_of("position", part) for part in PARTS), f"{LARGEST} {part_of('position', 'model')}")
+"""Parts of the worst error of position, and what no step brings it below: they stand in the table of a case although
+nothing judges them."""
 KEY = (
     "finished",
     "audit",

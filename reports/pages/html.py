@@ -46,7 +46,7 @@ SIGNS = {
 KEYS = {
     "within": "its limits", "expected-outside": "as far as a known property of the engine explains",
     "outside": "a limit, or without the number", "crashed": "with an exception",
-    BEYOND: "a limit, for a known cause of unknown size", "skipped": "not run",
+    BEYOND: "for a known cause of which no size is stored", "skipped": "not run",
 }  # fmt: skip
 """What each word of a table means, to a reader who has not read of it."""
 MOST = 2000  # rows of a table that a page shows; the file beside it has all

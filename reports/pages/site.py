@@ -135,7 +135,8 @@ def _pages(found: Results, share: float = 1.0) -> Iterator[Page]:
     for page in index_pages(found):
         if page.name == INDEX:
             title = " · ".join(map(_called, alone)) if alone and not found.cases else page.title
-            page = replace(page, title=title, sections=[*first, *page.sections])
+            own = [replace(one, title=one.title.partition(" of ")[0]) if one.title == title else one for one in first]
+            page = replace(page, title=title, sections=[*own, *page.sections])
             if led:
                 off = [page.lead] if any(row["verdict"] in WRONG for row in found.verdicts) else []
                 page = replace(

@@ -66,8 +66,8 @@ BENCH_TEXT = (
     "on the machine. The whole call includes the Python call and the trajectory that it builds."
 )
 ORDERS = columns(
-    case="Case", who="Engine", knob="Setting", order=("Observed order", Kind.NUMBER),
-    promised=("Promised order", Kind.NUMBER), says=("Comment", Kind.LONG),
+    case="Case", who="Engine", order=("Observed order", Kind.NUMBER), says=("Comment", Kind.LONG),
+    promised=("Promised order", Kind.NUMBER), knob="Setting",
 )  # fmt: skip
 TIMINGS = columns(
     case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER), error=("Error", Kind.NUMBER),

@@ -72,7 +72,7 @@ def test_a_number_beyond_its_limit_that_is_not_judged_is_named_and_not_counted_a
     text = sentence(runs_of(rows))
     assert text.splitlines() == [
         "1 of 2 runs is within all limits, 1 is beyond a limit and not judged (position up to 24 times its limit).",
-        "- Beyond a limit, not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason.",
+        "- Beyond, not judged: b:matched on ball:v (position 2.4e-05, 24 times its limit): The reason.",
         "- Without a limit: c:matched on ball:v.",
     ]
     shown = click.unstyle(run_shown.table(runs_of(rows), {}, 200)).splitlines()
@@ -134,7 +134,7 @@ def test_a_number_without_parts_is_blamed_on_what_is_wrong_in_the_motion(metric:
     ]  # fmt: skip
     blamed = position == Word.OUTSIDE and metric not in ("audit", "start_error")
     said = "; its error of position: mostly the step" if blamed else ""
-    assert f"b:matched on ball:v ({metric} 0.0005, 5e+02 times its limit{said})." in sentence(runs_of(rows))
+    assert f"b:matched on ball:v ({metric} 0.0005, 500 times its limit{said})." in sentence(runs_of(rows))
 
 
 def test_a_share_of_the_whole_is_no_multiple_of_its_limit() -> None:

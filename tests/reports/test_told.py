@@ -15,7 +15,7 @@ from crossbody.reports.importers.compare import OK, QUANTITIES, Row
 from crossbody.reports.importers.told import grid
 from crossbody.reports.judging.parts import part_of
 from crossbody.reports.judging.remedies import remedy
-from crossbody.reports.judging.told import NAMED, known_until, runs_of, sentence
+from crossbody.reports.judging.told import NAMED, in_times, known_until, runs_of, sentence
 from crossbody.reports.judging.verdict import UNMEASURED, Word
 from crossbody.reports.pages import grid as pages_grid
 
@@ -47,6 +47,20 @@ def rows_of(who: str, kind: str, times: float) -> list[dict[str, Any]]:
             row(who, Word.EXPECTED, "velocity", value=1.0), row(who, Word.INFO, **beyond, why=UNMEASURED + CAUSE),
         ],
     }[kind]]  # fmt: skip
+
+
+def digits(times: float) -> str:
+    """Two of a number below 1000, and no exponent."""
+    return f"{round(times, -1):.0f}" if times >= 99.5 else f"{times:.0f}" if times >= 9.95 else f"{times:.2g}"
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [(1.04, "1 times"), (1.66, "1.7 times"), (15.6, "16 times"), (1234.0, "1,200 times"), (15873.0, "16,000 times"),
+     (2.5e6, "2,500,000 times"), (9e7, "9e+07 times")],
+)  # fmt: skip
+def test_a_factor_is_said_in_plain_digits(factor: float, said: str) -> None:
+    assert in_times(factor) == said
 
 
 def named(text: str, begin: str) -> tuple[list[str], int]:
@@ -89,19 +103,19 @@ def test_the_counts_of_a_sentence_add_up(seed: int) -> None:
         assert told_of == {word: len(by[kind]) for kind, word in words.items() if by[kind] and kind != "within"}
     for kind in ("expected", "unbounded"):  # how far they are stands beside how many
         if most := max(by[kind], key=times.__getitem__, default=None):
-            size = f"position up to {times[most]:.2g} times its limit)"
+            size = f"position up to {digits(times[most])} times its limit)"
             whom = f"{', '.join(by[kind])}; " if kind == "expected" else ""
             assert f"{words[kind]} ({whom}{size}" in first
-            size = f"position {times[most] * 1e-3:.2g}, {times[most]:.2g} times its limit"
-            head = "Expected-outside, the largest" if kind == "expected" else "Beyond a limit, not judged"
+            size = f"position {times[most] * 1e-3:.2g}, {digits(times[most])} times its limit"
+            head = "Expected-outside, the largest" if kind == "expected" else "Beyond, not judged"
             assert f"- {head}: {most} on ball:hard ({size}): Soft contacts, of a step." in text or (
                 kind == "unbounded" and "mixed" not in kind_of[most]
             )
-    for kind, begin in (("outside", "Outside"), ("unbounded", "Beyond a limit, not judged")):
+    for kind, begin in (("outside", "Outside"), ("unbounded", "Beyond, not judged")):
         farthest = sorted(by[kind], key=lambda who: -times[who])
         assert named(text, begin) == (farthest[:NAMED], max(len(farthest) - NAMED, 0))
         for who in farthest[:NAMED]:
-            assert f"{who} on ball:hard (position {times[who] * 1e-3:.2g}, {times[who]:.2g} times its limit" in text
+            assert f"{who} on ball:hard (position {times[who] * 1e-3:.2g}, {digits(times[who])} times its limit" in text
     assert named(text, "Without a limit") == (by["unlimited"][:NAMED], max(len(by["unlimited"]) - NAMED, 0))
     assert ("0.31 of the horizon" in text) == (truth["compared"] < 1.0)
 
@@ -178,7 +192,7 @@ def test_the_sentence_says_of_what_the_largest_deviation_is_and_relative_to_what
     text = sentence(runs_of(rows))
     said = "one:p on ball:hard (position x by 0.0084 m at 1 s, 34 times its limit): Soft contacts, of a step."
     assert f"- Expected-outside, the largest: {said}" in text
-    assert "- Outside: two:p on ball:hard (event_times 0.5 s, 5e+02 times its limit)" in text
+    assert "- Outside: two:p on ball:hard (event_times 0.5 s, 500 times its limit)" in text
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -228,7 +242,7 @@ def test_the_sentence_ends_with_a_whole_clause_of_a_known_cause(name: str) -> No
 def test_a_run_beyond_its_limit_is_told_what_makes_its_error_smaller(
     parts: dict[str, tuple[float | None, float | None]], said: str
 ) -> None:
-    off = row("e:p", Word.INFO, value=1.7e-3, why="Known, but its size has not been measured here: steps")
+    off = row("e:p", Word.INFO, value=1.7e-3, why=f"{UNMEASURED}steps")
     rows = [off | {"settings": "dt=0.002 solver=NEWTON"}]
     rows += [
         row("e:p", Word.INFO, part_of("position", part), value=value, known=known, limit=math.nan)

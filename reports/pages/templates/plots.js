@@ -201,11 +201,17 @@
         beside(over, together(ends), [x, y, right], all.width - right - ROOM - 6);
         continue;
       }
-      spread(ends.map(([, at]) => at[1]), y._length).forEach((middle, k) => {
+      const heights = spread(ends.map(([, at]) => at[1]), y._length);
+      const alone = (height, k) => heights.every((other, j) => j === k || Math.abs(other - height) >= TALL);
+      heights.forEach((middle, k) => {
         const [{ title, wide, line, marker }, at] = ends[k];
         const { color } = line || marker;
-        const side = covered(at[0], middle, wide, -1) < covered(at[0], middle, wide, 1) ? -1 : 1;
-        const [there, height] = [x._offset + at[0] + side * ROOM, y._offset + middle];
+        // On the side, and if need be a line above or below, where it lies over the fewest marks.
+        const lifts = [0, -TALL, TALL].filter((lift) => !lift || alone(middle + lift, k));
+        const places = lifts.flatMap((lift) => [[1, lift], [-1, lift]]).map(([side, lift]) => [side, lift, covered(at[0], middle + lift, wide, side)]);
+        const [side, lift] = places.reduce((best, one) => (one[2] < best[2] ? one : best));
+        heights[k] = middle + lift;
+        const [there, height] = [x._offset + at[0] + side * ROOM, y._offset + heights[k]];
         const text = drawing("text", { x: there + 3 * side, y: height + 4, "text-anchor": side < 0 ? "end" : "start" }, title);
         text.setAttribute("class", "inside");
         text.style.setProperty("--of", color);
