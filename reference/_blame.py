@@ -14,6 +14,8 @@ from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.systems import absent
 
 VANISHED = 1e-6  # part of H M^-1 H^T of a row at the start below which what moves the row is as good as nothing
+WHIRLS = 1e6  # radians by which a row would turn, at its rate now, in the time of the run: its direction is none,
+FASTER = 30.0  # where motions are so many times faster than at the start
 LOOKS = 60  # states ahead, each twice as far as the one before
 
 
@@ -111,6 +113,35 @@ def vanished(system: System, active: Index, start: Floats, q: Floats, v: Floats)
         sizes.append(np.sum(H * np.linalg.solve(M, H.T).T, axis=1))
     found: list[int] = np.asarray(active)[sizes[1] < VANISHED * sizes[0]].tolist()
     return found
+
+
+def whirling(system: System, active: Index, v0: Floats, q: Floats, v: Floats, t: float) -> list[int]:
+    """Return the rows in force whose direction turns ever faster: they come to where they have none.
+
+    There, as at angle 0 of a ball joint or where two points meet, a row that is still in force, and has to
+    move, asks for velocities beyond all bounds.
+
+    Args:
+        system: the mechanism.
+        active: rows in force.
+        v0: velocities at the start (n,).
+        q: positions (nq,).
+        v: velocities there (n,).
+        t: time of the run, s.
+    """
+    if not len(active) or not np.linalg.norm(v) > FASTER * np.linalg.norm(v0):
+        return []
+    H, _, Hdv = system.constraint(q, v)
+    speeds = np.linalg.norm(H, axis=1) * np.linalg.norm(v)
+    return [i for i in np.asarray(active).tolist() if abs(Hdv[i]) * t > WHIRLS * speeds[i] > 0.0]
+
+
+def undirected(rows: list[int]) -> str:
+    """The start of a sentence on rows that have no direction (`whirling`)."""
+    return (
+        f"Rows {rows} are in force where they have no direction, as the bound of a ball joint at angle 0 or a "
+        "distance between points that meet: forces grow without bound near "
+    )
 
 
 def dependence(system: System, active: Index, q: Floats, v: Floats) -> str:

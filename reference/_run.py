@@ -15,7 +15,7 @@ from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.cases.control import Control, NotFinite
 from crossbody.reference import _dense
 from crossbody.reference._activations import Live
-from crossbody.reference._blame import dependence, not_finite, vanished
+from crossbody.reference._blame import dependence, not_finite, undirected, vanished, whirling
 from crossbody.reference._dense import Marks, Motion
 from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._interrupt import LONG_S, Interrupts
@@ -199,6 +199,8 @@ class CompiledRun:
                 return Outcome.FINISHED
             if code < 0:
                 return self._ended(code)
+            if code == layout.MORE and self._whirling():
+                return Outcome.ILL_POSED
             self._grow(code)
             interrupts.answer()
             now = time.perf_counter()
@@ -222,7 +224,7 @@ class CompiledRun:
             step = float(self.state["h"][0]) + RESOLUTION * float(self.options.t_end)
             q, v = np.split(self.work["y"], [self.system.nq])
             spoilt = self._blamed(q, v, step) != ""
-        if code == layout.STEP_TOO_SMALL and self._vanished():
+        if code == layout.STEP_TOO_SMALL and (self._vanished() or self._whirling()):
             return Outcome.ILL_POSED
         return Outcome.NOT_FINITE if spoilt else OUTCOMES[code]
 
@@ -230,6 +232,12 @@ class CompiledRun:
         q, v = np.split(self.work["y"], [self.system.nq])
         active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
         return vanished(self.system, active, self.start_state[: self.system.nq], q, v)
+
+    def _whirling(self) -> list[int]:
+        q, v = np.split(self.work["y"], [self.system.nq])
+        active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
+        v0, t = self.start_state[self.system.nq :], float(self.state["t"][0])
+        return whirling(self.system, active, v0, q, v, t) if np.isfinite(self.work["y"]).all() else []
 
     def _finite_rows(self) -> int:
         """Rows before the first one that holds NaN or infinity: energies and powers steer no step, but are told."""
@@ -326,8 +334,10 @@ class CompiledRun:
         if outcome in (Outcome.MODE_CYCLE, Outcome.PAINLEVE, Outcome.NO_CONSISTENT_MODES):
             return f"Rows {marked} at "
         if outcome is Outcome.ILL_POSED:
-            rows = self._vanished() or np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
-            return dependence(self.system, np.array(rows), q, v)
+            if rows := self._whirling():
+                return undirected(rows)
+            active = self._vanished() or np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
+            return dependence(self.system, np.array(active), q, v)
         if outcome is Outcome.INCONSISTENT and abs(state["energy_open"]) > state["energy_allowed"]:
             why = (
                 "energy, power and dynamics contradict each other"

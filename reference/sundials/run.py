@@ -18,7 +18,7 @@ import numpy as np
 from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
 from crossbody.cases.control import Control, NotFinite
 from crossbody.reference._activations import Live
-from crossbody.reference._blame import dependence, not_finite, vanished
+from crossbody.reference._blame import dependence, not_finite, undirected, vanished, whirling
 from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
@@ -39,6 +39,7 @@ from crossbody.reference.systems import absent
 RETRIES, CAUTION = 8, 0.1  # a trial step that left the kernels' domain is tried again, shorter
 ROUNDS = 100  # of rows and discrete variables that switch each other at one instant
 STILL = 200  # steps in a row, each within rounding of the time
+LOOK_AFTER = 1000  # steps, whether a row has still a direction
 ON_THE_MANIFOLD = 1e-6
 
 
@@ -92,7 +93,7 @@ class SundialsRun:
         self.state = State(0.0, self.q0.copy(), self.v0.copy(), np.zeros(nz))
         self.rows: list[tuple[float, Floats, Floats, Floats, Floats, Floats, list[int], Floats]] = []
         self.next_sample = self.next_input = self.next_tick = 0
-        self.retries = self.still = 0
+        self.retries = self.still = self.looked = 0
         self.ended_rows: list[int] = []
         self.failed = ""  # what a controller in Python gave that is not finite
         self.touches = Touches(set(), self.options.rtol)
@@ -160,6 +161,11 @@ class SundialsRun:
             raise Ended(Outcome.STEP_LIMIT)
         if elapsed.exceeds(self.options.time_limit):
             raise Ended(Outcome.TIME_LIMIT)
+        if self.scene.steps >= self.looked + LOOK_AFTER:
+            self.looked = self.scene.steps
+            active, s = np.array(self.equations.active, dtype=np.int64), self.state
+            if gone := whirling(self.system, active, self.v0, s.q, s.v, s.t):
+                raise Ended(Outcome.ILL_POSED, gone)
 
     def _settle(self, switched: bool) -> View:
         """Switch what must be switched now (more, if something has `switched`), and record the instant behind it.
@@ -397,7 +403,9 @@ class SundialsRun:
         if outcome is Outcome.NOT_FINITE:
             rows = self.failed or self._blamed()
         elif outcome is Outcome.ILL_POSED and self.ended_rows:
-            rows = dependence(self.system, np.array(self.ended_rows), s.q, s.v)
+            active = np.array(self.ended_rows)
+            gone = whirling(self.system, active, self.v0, s.q, s.v, s.t)
+            rows = undirected(gone) if gone else dependence(self.system, active, s.q, s.v)
         return f"{rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}. {outcome.advice}"
 
     def _blamed(self) -> str:

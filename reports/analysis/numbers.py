@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -61,11 +62,10 @@ def poles(found: Sequence[Place]) -> pd.DataFrame:
             continue
         m = modes(place.model)
         real, imag = _parts(m.poles)
-        size = np.hypot(real, imag)
-        for k in range(len(m.poles)):
+        m = replace(m, poles=real + 1j * imag)
+        for k, (frequency, damping) in enumerate(zip(m.frequency.tolist(), m.damping.tolist(), strict=True)):
             rows.append(
-                {"place": place.name, "real": real[k], "imag": imag[k], "frequency": float(size[k]),
-                 "damping": -float(real[k] / size[k]) if size[k] else np.nan,
+                {"place": place.name, "real": real[k], "imag": imag[k], "frequency": frequency, "damping": damping,
                  "led_by": m.states[_leader(m.participation[:, k])]}
             )  # fmt: skip
     return pd.DataFrame(rows, columns=list(POLES))

@@ -75,9 +75,8 @@ class Rung:
 
 def _truths(case: Case) -> Truths:
     """Return the truths of a case; of a scene as far as it is followed, of which its label tells."""
-    if not case.general or case.closed_form is not None:
+    if (known := followed_if_covered(case, BUDGET)) is None:
         return Truths(case)
-    known = followed_if_covered(case, BUDGET)
     cut = {"t_end": known.case.t_end} if known.part < 1.0 else {}
     return Truths(labelled(known.case, cut), replace(known, case=labelled(known.case, cut)))
 

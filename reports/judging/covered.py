@@ -19,12 +19,16 @@ LOOSE = 100.0
 SAME = 1e-3  # part of the time at which shapes meet by which two runs may be apart that know when
 
 
-def followed_if_covered(case: Case, budget: float) -> Followed:
+def followed_if_covered(case: Case, budget: float) -> Followed | None:
     """Return a scene as far as it is followed within a budget, s, by what covers its motion.
+
+    None for what is followed to its end at any price: a case that is no scene, or has a closed form.
 
     Raises:
         CaseUnsupported: for a file whose motion leaves what its model covers: nothing could be judged.
     """
+    if not case.general or case.closed_form is not None:
+        return None
     reached = followed(covered(case, budget), budget)
     refuse_uncovered(reached.case, reached.motion)
     return reached

@@ -109,8 +109,7 @@ def run_case(
     started = _clock()
     if why := watch.lost(label):
         raise CaseUnsupported(f"{label} is not available. {why}")
-    if truth is None and case.general and case.closed_form is None:
-        reached = followed_if_covered(case, budget)
+    if truth is None and (reached := followed_if_covered(case, budget)) is not None:
         case, truth = reached.case, truth_of(reached.case, reached, budget)
     truth = truth_of(case) if truth is None else truth
     refuse_uncovered(case, truth.trajectory)

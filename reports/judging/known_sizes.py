@@ -1,0 +1,81 @@
+"""By what errors must be measured of a scene in which fast, slow, resting and far coordinates stand beside each other.
+
+Motions that are made up have no scene, and no run has a wheel beside a finger: were a finger's error taken relative to
+the turns of a wheel, or a body's to how far off another one is, no number of theirs would differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+
+import numpy as np
+
+from crossbody.cases import Case, Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint, Scene
+from crossbody.reports.judging.asked import Asked, Found, unlike_by
+from crossbody.reports.measuring.scale import scale_of, scale_of_rates
+
+PART, LASTS = 1e-12, 2.0
+"""Part by which a size may differ; of a motion, s."""
+FLOATS = {"near": (0.5, -2.0, 1.0), "far": (100.0, 3.0, -40.0)}
+"""How far bodies float, m: each is measured by the largest of its own."""
+MOVES = {"wheel": -300.0, "finger": 0.2, "idle": 0.0, "rail": 0.05, "stop": 0.0}
+"""How far joints move, rad and m."""
+SIZES = {"wheel": 300.0, "finger": 1.0, "idle": 1.0, "rail": 0.05, "stop": 0.05}
+"""What they are measured by: the largest of their like, but no more than a radian, or their own."""
+SLOWER = {"finger": 0.2, "idle": 0.2, "rail": 0.05, "stop": 0.05}
+"""The same of those beside which no wheel turns."""
+
+
+@cache
+def wrong() -> tuple[Found, ...]:
+    """Return which coordinate is measured by another size than it must be, m or rad, or their rates."""
+    return unlike_by((_beside_a_wheel, _alone), "size", "coordinates of a scene, which end in", PART, 1e-300)
+
+
+def _beside_a_wheel() -> Iterator[Asked]:
+    case = _case((*FLOATS, *MOVES))
+    places = {f"{name} {x}": size for name, at in FLOATS.items() for x, size in zip("xyz", at, strict=True)}
+    wanted = {f"{name} {x}": max(map(abs, at)) for name, at in FLOATS.items() for x in "xyz"} | SIZES
+    yield from _asked(case, _motion(case, places | MOVES), wanted)
+
+
+def _alone() -> Iterator[Asked]:
+    case = _case(tuple(SLOWER))
+    truth = _motion(case, MOVES)
+    yield from _asked(case, truth, SLOWER)
+    rates = zip(SLOWER, scale_of_rates(truth, case).tolist(), strict=True)
+    yield from (("size", f"the rate of {name} in a scene", rate, SLOWER[name] / LASTS) for name, rate in rates)
+
+
+def _case(names: tuple[str, ...]) -> Case:
+    """Return bodies beside each other, each on a joint of its own."""
+    kinds = {**dict.fromkeys(FLOATS, "free"), "rail": "slide", "stop": "slide"}
+    inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+    return case_of(
+        Scene(
+            bodies=tuple(Body(name=name, mass=1.0, inertia=inertia) for name in names),
+            joints=tuple(Joint(name=name, body=name, type=kinds.get(name, "hinge")) for name in names),
+        ),
+        name="sizes", t_end=LASTS,
+    )  # fmt: skip
+
+
+def _motion(case: Case, moves: Mapping[str, float]) -> Trajectory:
+    """Return a motion from 0 to what coordinates move by, all of them steadily."""
+    part, names = np.linspace(0.0, 1.0, 5), [one.name for one in case.coordinates]
+    q = np.outer(part, [moves.get(name, 0.0) for name in names])
+    for at in case.quaternions:
+        q[:, at] = 1.0
+    v = np.tile([moves.get(one.name, 0.0) / LASTS for one in case.velocities], (len(part), 1))
+    none = np.zeros((len(part), 0))
+    return Trajectory(
+        t=LASTS * part, q=q, v=v, gap=none, lam=none, energy=np.ones((len(part), 2)), mode=none.astype(int)
+    )
+
+
+def _asked(case: Case, truth: Trajectory, wanted: Mapping[str, float]) -> Iterator[Asked]:
+    found = dict(zip((one.name for one in case.coordinates), scale_of(truth, case).tolist(), strict=True))
+    yield from (("size", f"{name} in a scene", found[name], size) for name, size in wanted.items())
