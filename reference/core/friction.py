@@ -65,7 +65,7 @@ def small_slip(s: Any, w: Work, i: int) -> float:
 
     Where all is at rest speeds are those of errors alone: what drives its bodies at present says then what is slow.
     """
-    return float(_known_to(s) * s.slip_speed + SMALL_SLIP * w.gained[i] + s.atol)
+    return float(max(_known_to(s) * s.slip_speed, SMALL_SLIP * w.gained[i]) + s.atol)
 
 
 @compiled
