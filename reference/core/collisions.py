@@ -65,18 +65,18 @@ def _touches(s: Any, m: Model, w: Work, b: Buffers, i: int) -> bool:
 def _choose(s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Mark the rows that take part in the next collision; the most approaching one, -1 if none approaches."""
     struck, rate = w.struck, w.rate
-    first, faster = -1, -slow(s)
+    first, faster = -1, 0.0
     for i in range(s.nc):
         struck[i] = NOT
-        if rate[i] < faster and _touches(s, m, w, b, i):
+        if rate[i] < min(faster, -slow(s, w, i)) and _touches(s, m, w, b, i):
             first, faster = i, rate[i] - TIE
     if first < 0:
         return first
     w.struck[first] = BOUNCES
     if s.rule != SEQUENTIAL:
         for i in range(s.nc):
-            if w.rate[i] <= slow(s) and _touches(s, m, w, b, i):
-                w.struck[i] = BOUNCES if w.rate[i] < -slow(s) else STAYS
+            if w.rate[i] <= slow(s, w, i) and _touches(s, m, w, b, i):
+                w.struck[i] = BOUNCES if w.rate[i] < -slow(s, w, i) else STAYS
     return first
 
 
@@ -213,10 +213,10 @@ def _stand_still(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     and the next impulse would cross the row in the order of these gaps instead of that of the rates.
     """
     nq, still = s.nq, False
-    struck, rate, least, most = w.struck, w.rate, STILL * s.speed, slow(s)
+    struck, rate, least = w.struck, w.rate, STILL * s.speed
     for i in range(s.nc):
         struck[i] = NOT
-        if least < abs(rate[i]) <= most and _touches(s, m, w, b, i):
+        if least < abs(rate[i]) <= slow(s, w, i) and _touches(s, m, w, b, i):
             struck[i] = STAYS
             still = True
     if not still or _endless(s):

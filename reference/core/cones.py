@@ -50,7 +50,7 @@ def _within_bound(m: Model, i: int, lam: Array, normal: int, first: int) -> floa
 @compiled
 def holds_on(s: Any, m: Model, w: Work, i: int) -> bool:
     """Whether a contact that sticks stays clear of its bound, as far as the stages tell, and where it is."""
-    if slip(m, w, i, w.rates[NODES - 1]) > most_drift(s):
+    if slip(m, w, i, w.rates[NODES - 1]) > most_drift(s, w, i):
         return False
     low, high = np.inf, -np.inf
     for stage in range(s.end + 1):
@@ -83,7 +83,7 @@ def beyond_bound(s: Any, m: Model, w: Work) -> int:
     for j in range(s.na if s.dependent_rows == 0 else 0):
         i = w.idx[j]
         if has_friction(m, i) and not w.slides[i] and w.gram[j, j] > 0.0:
-            pull = m.alpha[m.tangent[i], 1] * most_drift(s) / w.gram[j, j]
+            pull = m.alpha[m.tangent[i], 1] * most_drift(s, w, i) / w.gram[j, j]
             most = bound(m, i, max(lam[i], 0.0)) + pull + UNKNOWN * w.tolerated[i]
             if _within_bound(m, i, lam, i, m.tangent[i]) < -most:
                 return int(i)

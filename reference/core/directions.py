@@ -21,14 +21,14 @@ def lengthened(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[f
     t = m.tangent[i]
     p, r = w.way[t], w.way[t + 1]
     aside = y * p - x * r
-    ahead = max(x * p + y * r, _least_ahead(s, aside))
+    ahead = max(x * p + y * r, _least_ahead(s, w, i, aside))
     return ahead * p - aside * r, ahead * r + aside * p
 
 
 @compiled
-def _least_ahead(s: Any, aside: float) -> float:
-    """The least that a slip counts along its reference, by what it is across it."""
-    small = small_slip(s)
+def _least_ahead(s: Any, w: Work, i: int, aside: float) -> float:
+    """The least that the slip of contact i counts along its reference, by what it is across it."""
+    small = small_slip(s, w, i)
     part = 1.0 - (aside / small) ** 2 if abs(aside) < small else 0.0
     return float(small * part * part)
 
@@ -36,9 +36,9 @@ def _least_ahead(s: Any, aside: float) -> float:
 @compiled
 def bend(s: Any, m: Model, w: Work, i: int, x: float, y: float) -> tuple[float, float]:
     """Return by how many radians the direction of the slip velocity (x, y) of contact i turns with x, and with y."""
-    t, small = m.tangent[i], small_slip(s)
+    t, small = m.tangent[i], small_slip(s, w, i)
     p, r = w.way[t], w.way[t + 1]
-    ahead, aside, least = x * p + y * r, y * p - x * r, _least_ahead(s, y * p - x * r)
+    ahead, aside, least = x * p + y * r, y * p - x * r, _least_ahead(s, w, i, y * p - x * r)
     along, across = -aside, ahead
     if ahead <= least:  # it is lengthened: what it is along its reference does not count
         falls = -4.0 * (1.0 - (aside / small) ** 2) * aside / small if abs(aside) < small else 0.0

@@ -283,7 +283,7 @@ def _leaves_early(s: Any, w: Work, mode: Bytes) -> float:
     for i in range(s.nc if s.method != EXACT else 0):
         if w.kind[i] == LEAVE and mode[i] == BALLISTIC and w.hit[i] < first:
             depth = -0.25 * w.rates[0, i] * w.hit[i] * s.hs  # of a parabola
-            below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s)  # not by rounding, as one that rests
+            below = w.gaps[0, i] < -known(s, w) or w.rates[0, i] < -slow(s, w, i)  # not by rounding, as one that rests
             if below and (w.hit[i] <= s.theta or depth > MATTERS * known(s, w)):
                 first = w.hit[i]
     return float(first)
@@ -344,7 +344,7 @@ def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     if s.fsm != LEVEL or mode[i] != FREE or not m.unilateral[i] or m.follows[i] >= 0:
         return False
     collides = s.frozen and m.beta[i, 0] > 0.0
-    return bool(not collides and w.rate[i] < -slow(s) and abs(w.gap[i]) <= known(s, w))
+    return bool(not collides and w.rate[i] < -slow(s, w, i) and abs(w.gap[i]) <= known(s, w))
 
 
 @compiled
@@ -364,7 +364,7 @@ def stops_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     Rounding has one of them stop first. One that has just begun to slide goes on.
     """
     slides = has_friction(m, i) and mode[i] == SLIP and not has_begun(w, i)
-    return bool(slides and slip(m, w, i, w.rate) <= small_slip(s))
+    return bool(slides and slip(m, w, i, w.rate) <= small_slip(s, w, i))
 
 
 @compiled
@@ -384,7 +384,7 @@ def pulling(s: Any, m: Model, w: Work, mode: Bytes) -> int:
 @compiled
 def stops(s: Any, m: Model, w: Work, i: int) -> bool:
     """Whether what fired of contact i is the end of its slip: without a direction, as far as known, none jams in it."""
-    return bool(w.kind[i] == STOP or (w.kind[i] == JAM and slip(m, w, i, w.rate) <= small_slip(s)))
+    return bool(w.kind[i] == STOP or (w.kind[i] == JAM and slip(m, w, i, w.rate) <= small_slip(s, w, i)))
 
 
 @compiled

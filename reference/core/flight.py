@@ -36,7 +36,7 @@ def free_flight(s: Any, w: Work, i: int) -> float:
     else:
         w.kind[i] = TOUCH_INSIDE
         # at its turn; from rest clearly behind the threshold, so that rounding does not leave it where it was
-        behind = 0.0 if rate > slow(s) else 1.5 * slow(s)
+        behind = 0.0 if rate > slow(s, w, i) else 1.5 * slow(s, w, i)
         closing = -(behind + rate) / a if a < 0.0 else np.inf
         t = max(_fall(h - s.touch, rate, a), closing)
     return float(t / s.hs) if t <= s.hs else NEVER

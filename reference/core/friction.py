@@ -60,12 +60,12 @@ def bound(m: Model, i: int, normal: float) -> float:
 
 
 @compiled
-def small_slip(s: Any) -> float:
-    """The slip velocity below which the direction of the last step's start holds.
+def small_slip(s: Any, w: Work, i: int) -> float:
+    """The slip velocity of contact i below which the direction of the last step's start holds.
 
-    Where all is at rest speeds are those of errors alone: what drives bodies says then what is slow.
+    Where all is at rest speeds are those of errors alone: what drives its bodies at present says then what is slow.
     """
-    return float(_known_to(s) * max(s.slip_speed, s.gained_speed) + s.atol)
+    return float(max(_known_to(s) * s.slip_speed, SMALL_SLIP * w.gained[i]) + s.atol)
 
 
 @compiled
@@ -81,9 +81,9 @@ def _known_to(s: Any) -> float:
 
 
 @compiled
-def most_drift(s: Any) -> float:
-    """The slip velocity above which a contact that should stick slides: with others it cannot keep where it is."""
-    return DRIFT * small_slip(s)
+def most_drift(s: Any, w: Work, i: int) -> float:
+    """The slip velocity above which contact i, which should stick, slides: with others it cannot keep where it is."""
+    return DRIFT * small_slip(s, w, i)
 
 
 @compiled

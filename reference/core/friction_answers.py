@@ -112,7 +112,7 @@ def answer(what: int, s: Any, m: Model, w: Work, i: int) -> float:
     elif what == TURNS_ASIDE:
         return 1.0 if slips.turns_aside(s, m, w) else 0.0
     elif what == STANDS:
-        return 1.0 if slip(m, w, i, w.rate) <= small_slip(s) else 0.0
+        return 1.0 if slip(m, w, i, w.rate) <= small_slip(s, w, i) else 0.0
     elif what == HOLDS_ON:
         return 1.0 if cones.holds_on(s, m, w, i) else 0.0
     elif what == BEGIN_SLIP:

@@ -81,17 +81,18 @@ def arm(s: Any, m: Model, w: Work, kind: int, i: int) -> None:
     w.bands[:] = 0.0
     if kind == RELEASE and (s.fsm == MEMORYLESS or abs(w.lams[0, i]) <= w.noise[i]):
         w.bands[0] = w.noise[i]  # a row without memory may press again at once
-    elif kind == TOUCH_INSIDE and abs(w.rates[0, i]) <= slow(s):
-        w.bands[1] = slow(s)
+    elif kind == TOUCH_INSIDE and abs(w.rates[0, i]) <= slow(s, w, i):
+        w.bands[1] = slow(s, w, i)
     elif kind == CATCH:
-        w.bands[0] = slow(s) if abs(w.rates[0, i]) <= slow(s) else 0.0
+        w.bands[0] = slow(s, w, i) if abs(w.rates[0, i]) <= slow(s, w, i) else 0.0
         w.bands[1] = 2.0 * decided_to(s) if s.frictional else 0.0
     elif kind == STOP:
         # A slip that grazes zero goes on; one that has just begun is known no better than a slip with no direction.
-        below = small_slip(s) if has_begun(w, i) else GRAZE * least_slip(s)
+        below = small_slip(s, w, i) if has_begun(w, i) else GRAZE * least_slip(s)
         w.bands[0] = max(-slip_along(m, w, i, w.rates[0]), 0.0) + below
-    elif kind == DRIFT and 2.0 * slip(m, w, i, w.rates[0]) > most_drift(s):
-        w.bands[0] = 2.0 * slip(m, w, i, w.rates[0]) - most_drift(s)  # it has been found to move: until it does so more
+    elif kind == DRIFT and 2.0 * slip(m, w, i, w.rates[0]) > most_drift(s, w, i):
+        # It has been found to move: until it does so more.
+        w.bands[0] = 2.0 * slip(m, w, i, w.rates[0]) - most_drift(s, w, i)
     elif kind == CONE:
         begun = max(ON_BOUND * bound(m, i, abs(w.lams[0, i])), w.tolerated[i])
         if w.cones[0, i] <= begun:
@@ -131,7 +132,7 @@ def functions(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
         w.parts[0] = slip_along(m, w, i, w.rate)
     elif kind == DRIFT:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
-        w.parts[0] = most_drift(s) - slip(m, w, i, w.rate)
+        w.parts[0] = most_drift(s, w, i) - slip(m, w, i, w.rate)
     else:
         K.gaps(t, q, v, m.p, w.gap, w.rate)
         h, rate = w.gap[i], w.rate[i]
@@ -207,7 +208,7 @@ def fill_step(K: Any, s: Any, m: Model, w: Work, mode: Bytes, kind: int, i: int,
         elif kind == STOP:
             row[node] = slip_along(m, w, i, w.rates[node]) + w.bands[0]
         elif kind == DRIFT:
-            row[node] = most_drift(s) - slip(m, w, i, w.rates[node]) + w.bands[0]
+            row[node] = most_drift(s, w, i) - slip(m, w, i, w.rates[node]) + w.bands[0]
         elif kind in (CONE, JAM):
             row[node] = w.cones[node, i] + w.bands[0]
         else:

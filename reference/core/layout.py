@@ -150,8 +150,7 @@ STATE = np.dtype(
         ("switches", "i8"),
         ("watched", "i8"),  # w.cones has the end of the last step
         ("jumps", "i8"),  # loads may do so at this instant, so that slips without a direction are decided anew
-        ("slip_speed", "f8"),  # largest speed seen at contacts with friction,
-        ("gained_speed", "f8"),  # and that which what drives them gives in the time in which rows return to their laws
+        ("slip_speed", "f8"),  # largest speed seen at contacts with friction
         ("unknowns", "i8"),  # of the algebra of friction: how many,
         ("normals", "i8"),  # and how many are no sticking rows
         ("rank", "i8"),
@@ -344,6 +343,7 @@ class Work:
     spent: Bytes  # rows that share a load and whose multiplier has just vanished
     carries: Bytes  # places of a smallest set of rows that carries the load
     holds: Bytes  # these rows
+    gained: Floats  # (nc,) speed that what drives a row's trees gives while rows with friction return to their laws
     kind: Index  # (nc,) which guard fired
     pivot: Index
     # Where q' is not v, and empty elsewhere:

@@ -58,9 +58,9 @@ LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot
 
 
 @compiled
-def slow(s: Any) -> float:
-    """The rate below which a gap is taken to stand still; of bodies at rest, beside what drives them."""
-    return float(SLOW * max(s.speed, s.gained_speed))
+def slow(s: Any, w: Work, i: int) -> float:
+    """The rate below which gap i is taken to stand still; of bodies at rest, beside what drives them."""
+    return float(SLOW * max(s.speed, w.gained[i]))
 
 
 @compiled
@@ -119,7 +119,7 @@ def _left_over(s: Any, m: Model, w: Work, i: int) -> float:
     """
     if s.frozen == 0 or not m.beta[i, 0] > 0.0:
         return 0.0
-    return float(w.law[i, 0] * s.touch + w.law[i, 1] * slow(s))
+    return float(w.law[i, 0] * s.touch + w.law[i, 1] * slow(s, w, i))
 
 
 @compiled
@@ -370,7 +370,7 @@ def _is_held_beside_friction(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: 
 @compiled
 def _stays(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether loops hold contact i, which stands at its surface: with what it presses no law says, as just below it."""
-    if not (s.frictional and s.loops and has_friction(m, i) and abs(w.rate[i]) <= slow(s)):
+    if not (s.frictional and s.loops and has_friction(m, i) and abs(w.rate[i]) <= slow(s, w, i)):
         return False
     held = False
     mode[i] = active_mode(s, m, w, i)
@@ -390,7 +390,7 @@ def _rests(s: Any, w: Work, i: int) -> bool:
     Which of the corners of a box that rests are a little open, or below, rounding decides. Where forces come on they
     press together: from a gap of rounding one would gain a speed far above it.
     """
-    lies = s.frictional and s.jumps and abs(w.gap[i]) <= s.touch and abs(w.rate[i]) <= slow(s)
+    lies = s.frictional and s.jumps and abs(w.gap[i]) <= s.touch and abs(w.rate[i]) <= slow(s, w, i)
     return bool(lies and w.let_go[i] != s.t)
 
 
@@ -406,18 +406,18 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
         return active_mode(s, m, w, i) if presses else int(mode[i])
     if h > (s.touch if collides and mode[i] == FREE else 0.0):
         return FREE
-    if collides and rate < -slow(s):
+    if collides and rate < -slow(s, w, i):
         return int(mode[i])
     if mode[i] != FREE:
-        closing = rate < -slow(s)
+        closing = rate < -slow(s, w, i)
         if closing and (_would_press(K, s, m, w, mode, i, False) or _is_held(K, s, m, w, mode, i)):
             return active_mode(s, m, w, i)
         return int(mode[i])
-    if rate < -slow(s):
+    if rate < -slow(s, w, i):
         return active_mode(s, m, w, i)
     if h < -max(DEEP, known(s, w)):
         return active_mode(s, m, w, i) if _would_press(K, s, m, w, mode, i, False) else BALLISTIC
-    if rate <= slow(s) and (_would_press(K, s, m, w, mode, i, collides) or _stays(K, s, m, w, mode, i)):
+    if rate <= slow(s, w, i) and (_would_press(K, s, m, w, mode, i, collides) or _stays(K, s, m, w, mode, i)):
         return active_mode(s, m, w, i)
     return FREE
 
@@ -425,7 +425,7 @@ def _next_level(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
 @compiled
 def _next_memoryless(K: Any, s: Any, m: Model, w: Work, mode: Bytes, i: int) -> int:
     """Where the complementarity problem's next pivot puts row i; below the surface it is CONTACT or BALLISTIC."""
-    if mode[i] == FREE and not (w.gap[i] <= s.touch and (w.rate[i] <= slow(s) or w.gap[i] < -DEEP)):
+    if mode[i] == FREE and not (w.gap[i] <= s.touch and (w.rate[i] <= slow(s, w, i) or w.gap[i] < -DEEP)):
         return FREE
     if is_active(mode[i]):
         return BALLISTIC if w.lam[i] < -w.noise[i] else CONTACT

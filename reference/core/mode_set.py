@@ -46,9 +46,9 @@ def look(s: Any, m: Model, w: Work) -> None:
         if is_decided(w, i):
             size = slip(m, w, i, w.rate)
             w.slid[i] = w.slides[i] and size > 0.0
-            fresh = w.begins[i] or w.since[i] == s.t or (s.jumps and size <= small_slip(s))
+            fresh = w.begins[i] or w.since[i] == s.t or (s.jumps and size <= small_slip(s, w, i))
             w.stands[i] = fresh or not w.slides[i]
-            if not w.stands[i] and size > small_slip(s):
+            if not w.stands[i] and size > small_slip(s, w, i):
                 for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
                     w.along[c] = (w.hda[c] - w.rest[w.idx[c]]) / size
                     w.way[w.idx[c]] = w.along[c]

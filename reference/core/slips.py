@@ -44,6 +44,7 @@ def begin(s: Any, m: Model, w: Work) -> None:
             w.decides[m.follows[i]] = 0
     for left in (w.way, w.rest, w.tolerated, w.open_v, w.open_rate):
         left[:] = 0.0
+    w.gained[:] = 0.0
     w.off[:], w.begins[:], w.since[:], w.within[:], w.course[:] = 0, 0, -np.inf, np.inf, np.inf
 
 
@@ -63,21 +64,42 @@ def angle(m: Model, w: Work, i: int, rate: Array) -> float:
 
 
 @compiled
-def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
-    """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips.
+def _gain(m: Model, w: Work, j: int) -> float:
+    """What a body gains at present while the row at place j returns to its law; -1 for one without friction.
 
-    What their bodies gain while a row returns to its law stands beside it: at rest speeds are those of errors. What
-    drives a row by speeds alone does not count: it vanishes there, and is large where a contact runs along an edge.
+    What drives a row by speeds alone does not count: it vanishes at rest, and is large where contacts run along edges.
     """
+    i = w.idx[j]
+    returns = max(m.alpha[i, 1], np.sqrt(m.alpha[i, 0])) if has_friction(m, i) else 0.0
+    drive = w.scale[j] - abs(w.Hdv[j]) - w.law[i, 1] * abs(w.hda[j])
+    return float(drive / returns if returns > 0.0 else -1.0)
+
+
+@compiled
+def _note_gains(s: Any, m: Model, w: Work) -> None:
+    """Note what bodies gain at present while a row in contact returns to its law: at rest speeds are those of errors.
+
+    It counts for all rows of the same trees. An open row of trees without contact keeps what it had in the last one.
+    """
+    for k in range(s.nc):
+        most = -1.0
+        for j in range(s.na):
+            i = w.idx[j]
+            if m.trees[k, 0] < m.trees[i, 1] and m.trees[i, 0] < m.trees[k, 1]:
+                most = max(most, _gain(m, w, j))
+        if most >= 0.0:
+            w.gained[k] = most
+
+
+@compiled
+def note_speed(s: Any, m: Model, w: Work, rate: Array) -> None:
+    """Keep the largest speed seen at contacts with friction: of their gaps, and of what makes up their slips."""
+    _note_gains(s, m, w)
     for i in range(s.nc):
         if has_friction(m, i):
             s.slip_speed = max(s.slip_speed, slip(m, w, i, rate), abs(rate[i]))
     for j in range(s.na):
         i, size = w.idx[j], 0.0
-        returns = max(m.alpha[i, 1], np.sqrt(m.alpha[i, 0])) if has_friction(m, i) else 0.0
-        if returns > 0.0:
-            drive = w.scale[j] - abs(w.Hdv[j]) - w.law[i, 1] * abs(w.hda[j])
-            s.gained_speed = max(s.gained_speed, drive / returns)
         for c in range(m.span[i, 0], m.span[i, 1] if is_tangent(m, i) else 0):
             size += abs(w.H[j, c] * w.y[s.nq + c])
         s.slip_speed = max(s.slip_speed, size)
@@ -92,7 +114,7 @@ def _comes_near_zero(s: Any, m: Model, w: Work, i: int) -> bool:
     before, after, along = slip(m, w, i, w.rates[0]), slip(m, w, i, w.rates[NODES - 1]), 0.0
     for t in range(m.tangent[i], m.tangent[i] + m.tangents[i]):
         along += (w.rates[0, t] - m.drift[t] - w.rest[t]) * (w.rates[NODES - 1, t] - m.drift[t] - w.rest[t])
-    return bool(before > small_slip(s) and along < 0.5 * before * max(before, after))
+    return bool(before > small_slip(s, w, i) and along < 0.5 * before * max(before, after))
 
 
 @compiled
@@ -106,7 +128,7 @@ def turns_aside(s: Any, m: Model, w: Work) -> bool:
         stops = w.hit[i] <= s.theta and w.kind[i] == STOP
         if stops:
             along = slip_along(m, w, i, w.rate)
-            if slip(m, w, i, w.rate) ** 2 - along * along > small_slip(s) ** 2:
+            if slip(m, w, i, w.rate) ** 2 - along * along > small_slip(s, w, i) ** 2:
                 return True
         elif m.tangents[i] > 1 and w.slides[i] and _comes_near_zero(s, m, w, i):
             return True
@@ -117,7 +139,7 @@ def turns_aside(s: Any, m: Model, w: Work) -> bool:
 def dies_out(s: Any, m: Model, w: Work, i: int) -> bool:
     """Whether the slip of contact i falls in the step, and has turned where it has no direction that is known."""
     size = slip(m, w, i, w.rate)
-    falls = size <= NEAR * small_slip(s) and size < slip(m, w, i, w.rates[0]) and not has_begun(w, i)
+    falls = size <= NEAR * small_slip(s, w, i) and size < slip(m, w, i, w.rates[0]) and not has_begun(w, i)
     return bool(falls and w.course[i] < np.inf and np.cos(angle(m, w, i, w.rate) - w.course[i]) < 1.0 - TURNED)
 
 
@@ -183,7 +205,7 @@ def _forget(s: Any, m: Model, w: Work, i: int, size: float) -> None:
 
     To forget it early would turn the friction of contact i at once, and break others loose that are near their bounds.
     """
-    if has_begun(w, i) and size > CLEAR * max(small_slip(s), _rest(m, w, i)):
+    if has_begun(w, i) and size > CLEAR * max(small_slip(s, w, i), _rest(m, w, i)):
         w.since[i], s.watched = -np.inf, 0
     if not has_begun(w, i) and (m.tangents[i] == 1 or size > FORGETS * _rest(m, w, i)):
         count_from_none(m, w, i)
@@ -202,13 +224,13 @@ def renew(s: Any, m: Model, w: Work, rate: Array) -> bool:
             _forget(s, m, w, i, slip(m, w, i, rate))
             along = slip_along(m, w, i, rate)
             slow = m.tangents[i] > 1 and slip(m, w, i, rate) <= least_slip(s)
-            if along < -small_slip(s) if has_begun(w, i) else slow and along < -GRAZE * least_slip(s):
+            if along < -small_slip(s, w, i) if has_begun(w, i) else slow and along < -GRAZE * least_slip(s):
                 w.hit[i], w.kind[i], linger = 0.0, STOP, True  # it has passed zero, by less in each step than is known
-            elif slip(m, w, i, rate) > small_slip(s):
+            elif slip(m, w, i, rate) > small_slip(s, w, i):
                 face(m, w, i, rate)
             if m.tangents[i] > 1:
                 s.have_jacobian = 0  # it turns at a rate that goes as 1/|v_t|
-                if w.course[i] == np.inf or slip(m, w, i, rate) > CLEAR * small_slip(s):
+                if w.course[i] == np.inf or slip(m, w, i, rate) > CLEAR * small_slip(s, w, i):
                     w.course[i] = angle(m, w, i, rate)
             if _lingers(s, m, w, i, rate):
                 w.hit[i], w.kind[i], linger = 0.0, STOP, True

@@ -209,7 +209,7 @@ def _most_pull(s: Any, m: Model, w: Work) -> float:
     most = 0.0
     for j in range(s.na):
         i, n = w.idx[j], m.follows[w.idx[j]]
-        rests = n < 0 and is_decided(w, i) and abs(w.hda[j]) <= small_slip(s)
+        rests = n < 0 and is_decided(w, i) and abs(w.hda[j]) <= small_slip(s, w, i)
         if rests or (n >= 0 and has_friction(m, n) and w.stands[n]):
             most = max(most, abs(m.alpha[i, 1] * w.hda[j]))
     return float(most)

@@ -25,7 +25,7 @@ def _last_clear(s: Any, m: Model, w: Work, i: int) -> float:
     t = m.tangent[i]
     found = w.course[i] if w.course[i] < np.inf else np.arctan2(w.way[t + 1], w.way[t])
     for node in range(NODES):
-        if at_node(node) <= s.theta and slip(m, w, i, w.rates[node]) > CLEAR * small_slip(s):
+        if at_node(node) <= s.theta and slip(m, w, i, w.rates[node]) > CLEAR * small_slip(s, w, i):
             found = angle(m, w, i, w.rates[node])
     return float(found)
 
@@ -151,7 +151,7 @@ def dies_into_jam(s: Any, m: Model, w: Work, i: int) -> bool:
     for j in range(s.na):
         k = w.idx[j]
         slides = has_friction(m, k) and w.slides[k] and not is_dry(m, k)
-        if k != i and slides and slip(m, w, k, w.rate) <= small_slip(s):
+        if k != i and slides and slip(m, w, k, w.rate) <= small_slip(s, w, k):
             return False  # several turn together
     c = w.listed[m.tangent[i]]
     x, y = w.along[c], w.along[c + 1]

@@ -149,7 +149,9 @@ def _account(s: Any, m: Model, w: Work) -> None:
     for c in range(s.n):
         speed = max(speed, abs(w.open_v[c]) + abs(w.open_rate[c]) * s.open_for)
     s.open_way += s.open_lever * speed * dt
-    most = most_drift(s) * s.t_end
+    most = 0.0
+    for i in range(s.nc):
+        most = max(most, most_drift(s, w, i) * s.t_end)
     if s.open_way > most and not s.indeterminate:
         s.indeterminate, s.determined_until = 1, s.open_t + dt * max(most - before, 0.0) / (s.open_way - before)
     s.open_t = s.t

@@ -287,7 +287,8 @@ class Walk:
     def _switch(self, group: list[Event]) -> bool:
         """Pass all events of one instant: what fell to zero, and what follows from it; False if it is only grazed."""
         t, width, changes = group[0].t, 2 * self.at.system.n, list[Floats]()
-        new_here = [e.contact for e in group if e.before not in (Mode.STICK, Mode.SLIP)]
+        # At the start nothing has held a row before, which lets deviations of its slip die out.
+        new_here = [e.contact for e in group if t == 0.0 or e.before not in (Mode.STICK, Mode.SLIP)]
         old = np.zeros(width)
         if t > 0.0:
             before, k = self._here(t, "left"), self._sample(t, "left")

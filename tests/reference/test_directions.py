@@ -15,7 +15,7 @@ SMALL = 1e-8
 
 @pytest.fixture(autouse=True)
 def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(directions, "small_slip", lambda _: SMALL)
+    monkeypatch.setattr(directions, "small_slip", lambda *_: SMALL)
     monkeypatch.setattr(directions, "_least_ahead", directions._least_ahead.py_func)
 
 

@@ -10,7 +10,7 @@ from friction_scenes import G, on_floor, pair, point, rod_on_floor, rubbed_tree,
 
 from crossbody.cases import Mode, Outcome, SceneError, UnknownName
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Body, RowLaw, Shape
+from crossbody.cases.scene import Body, Joint, RowLaw, Scene, Shape
 from crossbody.reference import kernels, simulate
 from crossbody.reference.linear import _slipping, sensitivity
 from crossbody.reference.linear.differences import differences
@@ -292,3 +292,28 @@ def test_stops_by_parameters_of_a_scene_and_wrong_names():
     for name in ("mu[1]", "drift[0]", "mu[7]"):
         with pytest.raises(UnknownName, match="mu"):
             sensitivity(made, [0, 0], [1.0, 0], 0.1, parameters=[name])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_slide_of_a_dry_hinge_that_begins_from_rest_is_one_sided_by_its_speed(seed: int) -> None:
+    """Differences to both sides tell it: the ones that agree are derivatives, and the others none."""
+    draw = np.random.default_rng([seed, 19])
+    mass, loss = draw.uniform(0.5, 2.0), draw.uniform(0.2, 0.8)
+    body = Body(name="rod", mass=mass, com=(0.0, 0.0, -0.5), inertia=(0.01, 0.01, 0.01, 0.0, 0.0, 0.0))
+    hinge = Joint(name="hinge", body="rod", type="hinge", axis=(0, 1, 0), friction_loss=loss)
+    scene = Scene(bodies=(body,), joints=(hinge,))
+    made, t_end = system(scene, case_of(scene).law), 0.4
+    start = [float(draw.choice([-1.0, 1.0]) * draw.uniform(0.6, 2.0)), float(draw.choice([0.0, 0.0, 0.3]))]
+
+    def end(q: float, v: float) -> np.ndarray:
+        run = simulate(made, [q], [v], t_end, rtol=1e-13)
+        return np.concatenate([run.q[-1], run.v[-1]])
+
+    found, step = sensitivity(made, start[:1], start[1:], t_end), 1e-5
+    for k, way in enumerate(np.eye(2)):
+        sides = [(end(*(start + s * step * way)) - end(*start)) / (s * step) for s in (1.0, -1.0)]
+        agree = np.abs(sides[0] - sides[1]).max() < 1e-3
+        assert bool(np.isnan(found.by_start[:, k]).all()) is not agree
+        if agree:
+            np.testing.assert_allclose(found.by_start[:, k], 0.5 * (sides[0] + sides[1]), atol=1e-6)
+    assert found.outcome is (Outcome.ILL_POSED if start[1] == 0.0 else Outcome.FINISHED), found.message
