@@ -201,12 +201,12 @@ def _off_laws(s: Any, m: Model, w: Work, t: float, of_gaps: bool) -> float:
 
 
 @compiled
-def put_on_rubbing_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
-    """Move out = (q, v) likewise where some rows have friction: at the end of an implicit step, and where it is told.
+def _put_on_rubbing_rows(K: Any, s: Any, m: Model, w: Work, theta: float, out: Array) -> None:
+    """Move out = (q, v) likewise where some rows have friction, inside a step that is long for them, where it is told.
 
     What is watched is not moved: where forces that stick or slide reach their bounds all of a step's own stages count.
     """
-    if theta == 0.0 or not long_for_rows(s) or s.loops or not exact.is_linear(s, w):
+    if theta in (0.0, 1.0) or not long_for_rows(s) or s.loops or not exact.is_linear(s, w):
         return
     q, v, t = out[: s.nq], out[s.nq :], theta * s.hs
     for _ in range(CORRECTIONS - 1):
@@ -232,7 +232,7 @@ def with_rows(K: Any, s: Any, m: Model, w: Work, theta: float, t: float, out: Ar
     """
     state(s, m, w, theta, out)
     if told and s.frictional and s.na > 0:
-        put_on_rubbing_rows(K, s, m, w, theta, out)
+        _put_on_rubbing_rows(K, s, m, w, theta, out)
     if s.na > 0 and not put_on_rows(K, s, m, w, theta, out, tolerated(s)):
         return int(accelerate(K.dynamics, K.rows, K.solve, s, m, w, t, out[: s.nq], out[s.nq :], OWN))
     return 0

@@ -71,8 +71,6 @@ def _finish(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     # Anew after an implicit step too: lam is then the law's at y1, not what Newton's residue makes of it.
     if s.method == IMPLICIT:
         s.t_old = s.t
-        if s.frictional and s.na > 0:
-            dense.put_on_rubbing_rows(K, s, m, w, 1.0, w.y1)
         known = dense.put_on_rows(K, s, m, w, 1.0, w.y1, dense.tolerated(s))
         if known:
             dop853.keep(K, s, m, w, t, w.y1[:nq], w.y1[nq:], end)

@@ -166,10 +166,6 @@ def test_a_capsule_rocks_on_another_across_it() -> None:
     assert th.min() < -0.29
 
 
-TURNED = 100.0
-"""Times the tolerance to which loads are known: those of a body that turns follow from where it has turned to."""
-
-
 def egg(rng: np.random.Generator) -> tuple[Scene, np.ndarray, np.ndarray]:
     """A heavy ellipsoid that lies on stiff ground, slides and begins to rock."""
     half, mass = rng.uniform(0.08, 0.2, 3), rng.uniform(0.5, 2.0)
@@ -193,13 +189,14 @@ def egg(rng: np.random.Generator) -> tuple[Scene, np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-7])
 @pytest.mark.parametrize("seed", range(4))
-def test_multipliers_of_stiff_rows_with_friction_are_known_as_motions_are(seed: int, rtol: float) -> None:
-    """At the ends of steps and between them: a gap that a long step knows to the tolerance would put them off by a0."""
+def test_multipliers_between_the_ends_of_long_steps_are_no_further_off_than_there(seed: int, rtol: float) -> None:
+    """A gap that the interpolant of a long step knows to the tolerance would put them off by a0."""
     scene, q, v = egg(np.random.default_rng([seed, 61]))
     ends = np.unique(run(scene, q, v, 0.2, rtol=rtol).t)
     times = np.unique(np.r_[ends, 0.5 * (ends[1:] + ends[:-1])])
     found, exact = (run(scene, q, v, 0.2, rtol=one, samples=times) for one in (rtol, 1e-12))
     events = np.array([0.0, *(event.t for event in exact.events)])
     clear = np.abs(times[:, None] - events).min(axis=1) > 5e-3  # there either side counts
+    off, at_end = np.abs(found.lam - exact.lam)[:, 0], np.isin(times, ends)
     assert found.counts["implicit_steps"] > 20
-    assert np.abs(found.lam - exact.lam)[clear, 0].max() <= TURNED * rtol * np.abs(exact.lam).max()
+    assert off[clear & ~at_end].max() <= off[clear & at_end].max()
