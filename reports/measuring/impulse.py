@@ -96,7 +96,8 @@ def beside(run: Trajectory, exact: Trajectory, whole: Trajectory, signal: Signal
     """
     if not counts_itself(run, whole):
         return cumulated(exact, *signal(exact))
-    whole = _held(whole, 1 + np.flatnonzero(stopping(whole)[1:]))
+    # What slides on behind a turn is known there: only the side in front of an instant is held.
+    whole = _held(whole, 1 + np.flatnonzero(stopping(whole)[1:] & (np.diff(whole.t) > 0.0)))
     values, along = signal(whole)
     if whole.acts == Acts.AT:
         return integrals(whole, values if along is None else values * along)(exact.t)

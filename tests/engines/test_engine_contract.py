@@ -257,4 +257,4 @@ def test_a_dry_run_builds_nothing_of_the_reference(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr("crossbody.engines.reference.equations_of", build)
     assert {profile: dict(engine.planned(case, profile)) for profile in told} == told
-    assert tell(["bouncing_ball"], ["reference"], None, (), None, (), tmp_path / "out", None, (), 0.0) == 0
+    assert tell(["bouncing_ball"], ["reference"], None, (), None, (), tmp_path / "out", None, (), 0.0, 60.0) == 0

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
 from crossbody import hw
@@ -29,6 +31,14 @@ class Linear:
     starts: bool = True
     how: str = "exact"
     tolerance: float = 1.0
+
+    @property
+    def grids(self) -> list[NDArray[np.intp]]:
+        return [np.arange(n) for n in self.layout.samples]
+
+    @property
+    def cut(self) -> list[SimpleNamespace]:
+        return [SimpleNamespace(t=1e-2 * np.arange(n)) for n in self.layout.samples]
 
     def residual(self, x: Floats) -> Floats:
         return self.A @ x - self.b

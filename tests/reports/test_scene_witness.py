@@ -137,7 +137,8 @@ def test_a_string_that_cannot_get_shorter_ends_a_motion_with_a_sentence(seed: in
     run = engines.load(engine).prepare(case_of(scene, t_end=0.5), profile).run()
     assert run.outcome is Outcome.ILL_POSED
     assert run.t[-1] == pytest.approx({5: 0.02570867479, 7: 0.00196796183}[seed], rel=1e-6)
-    assert "lmost nothing can move" in run.message
+    said = "in force where they have no direction" if engine == "reference" else "almost nothing can move"
+    assert said in run.message
 
 
 @pytest.mark.timeout(100)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from crossbody import cases
-from crossbody.cases import Event, Mode, Switch, Tier, Trajectory
+from crossbody.cases import Acts, Event, Mode, Switch, Tier, Trajectory
 from crossbody.cases.defaults import shortest
 from crossbody.reports import metrics
 from crossbody.reports.measuring.alignment import aligned, instants
+from crossbody.reports.measuring.impulse import true_impulse
 from crossbody.reports.measuring.truth import Truth, from_run, sample_times
 
 CASE = cases.load("sliding_block", "turns")
@@ -131,3 +132,19 @@ def test_a_gap_that_is_of_another_edge_is_beside_a_run_on_both_sides(seed: int) 
     inside, exact = aligned(truth, run, CASE, releases=True)
     np.testing.assert_allclose(exact.lam, run.lam[inside], rtol=1e-9, atol=1e-9)
     assert metrics.load("lam_impulse_path").measure(truth, run, CASE) < 1e-9 + 10.0 * abs(off) / CASE.t_end
+
+
+@pytest.mark.parametrize("turn", [0.31, 0.5, 0.77])
+def test_an_impulse_behind_a_turn_is_that_of_the_friction_that_turned(turn: float) -> None:
+    """Of a slip that turns and slides on friction jumps to the other side: both sides of the instant are known."""
+    t = np.sort(np.append(np.linspace(0.0, 1.0, 41), [turn, turn]))
+    behind = (t > turn) | np.append(False, (t[1:] == turn) & (t[:-1] == turn))
+    lam, rest = np.where(behind, -3.0, 2.0)[:, None], np.ones((len(t), 1))
+    event = Event(t=turn, contact=0, before=Mode.SLIP, after=Mode.SLIP)
+    whole = Trajectory(
+        t=t, q=rest, v=rest, gap=0.0 * rest, lam=lam, energy=np.hstack([rest, rest]),
+        mode=np.full((len(t), 1), Mode.SLIP, dtype=np.int8), events=(event,),
+    )  # fmt: skip
+    stepped = replace(whole, acts=Acts.BEFORE)
+    found = true_impulse(stepped, whole, whole)[:, 0]
+    np.testing.assert_allclose(found, np.where(t < turn, 2.0 * t, 2.0 * turn - 3.0 * (t - turn)), atol=1e-12)

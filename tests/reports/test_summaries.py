@@ -63,7 +63,7 @@ def runs(*ends: tuple[Outcome | str, Word, float]) -> pd.DataFrame:
 def test_a_sweep_says_how_many_end_as_they_must_and_who_does_not() -> None:
     good = (Outcome.FINISHED.value, Word.WITHIN, 1e-9)
     assert in_words(runs(good, good)) == (
-        "2 of 2 runs end at their horizon and within their limits. 2 had a truth, the largest error is 1e-09."
+        "2 of 2 runs end at their horizon and within their limits. 2 had a truth, the largest relative error is 1e-09."
     )
     untold = (Outcome.FINISHED.value, Word.INFO, np.nan)
     assert in_words(runs(good, untold, untold)).startswith(
@@ -74,7 +74,7 @@ def test_a_sweep_says_how_many_end_as_they_must_and_who_does_not() -> None:
     assert told.startswith("1 of 3 runs end at their horizon and within their limits; not 2 of e:p: ")
     assert "outside 1" in told
     assert Outcome.STEP_TOO_SMALL.value in told
-    assert "largest error is 0.5" in told
+    assert "largest relative error is 0.5" in told
 
 
 def test_a_gap_map_says_who_creates_most_energy_and_who_follows_the_ideal_pattern() -> None:
