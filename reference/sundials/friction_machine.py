@@ -172,7 +172,7 @@ class FrictionMachine(LevelMachine):
         if not (np.isfinite(gap).all() and np.isfinite(rate).all()):
             raise Ended(Outcome.NOT_FINITE)
         self.renew(q, v, t)
-        joins = self._joining | {i for i in self.rows if self._meets(i, gap, rate, q)}
+        joins = self._joining | {i for i in self.rows if self._meets(i, gap, rate, self._touch(q) if t == 0.0 else 0.0)}
         if self.contacts() or joins:
             self._decide(t, q, v, joins, gap, rate)
         while joins := {i for i in self.rows if self._catches(i, t, q, v, gap, rate)}:  # what changed lets others in
@@ -221,11 +221,14 @@ class FrictionMachine(LevelMachine):
             self.begun.discard(i)
             self.courses.pop(i, None)
 
-    def _meets(self, i: int, gap: Floats, rate: Floats, q: Floats) -> bool:
-        """Whether an open contact stands where it may press: at its surface, or below it from the start on."""
+    def _meets(self, i: int, gap: Floats, rate: Floats, rounding: float) -> bool:
+        """Whether an open contact stands where it may press: at its surface, or below it from the start on.
+
+        How far above it rounding of a start may put it, `rounding`, counts as at it.
+        """
         if self.modes[i] != Mode.FREE:
             return False
-        return bool(gap[i] < -self.deep or (gap[i] <= self._touch(q) and rate[i] <= self.slow))
+        return bool(gap[i] < -self.deep or (gap[i] <= rounding and rate[i] <= self.slow))
 
     def _decided(self, t: float, seen: Seen, joins: set[int]) -> Tried:
         """A set of modes that agrees with its forces."""
