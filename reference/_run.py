@@ -25,7 +25,7 @@ from crossbody.reference._system import System, initial_modes
 from crossbody.reference.ahead import ask
 from crossbody.reference.core import layout
 from crossbody.reference.core.bundles import table
-from crossbody.reference.kinds import Floats
+from crossbody.reference.kinds import Floats, Index
 from crossbody.reference.notes import AMOUNTS, NOTES, noted
 from crossbody.reference.options import COLLISIONS, FSMS, Options
 from crossbody.reference.systems import absent
@@ -228,16 +228,18 @@ class CompiledRun:
             return Outcome.ILL_POSED
         return Outcome.NOT_FINITE if spoilt else OUTCOMES[code]
 
+    def _active(self) -> Index:
+        """Rows that bear now."""
+        return np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
+
     def _vanished(self) -> list[int]:
         q, v = np.split(self.work["y"], [self.system.nq])
-        active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
-        return vanished(self.system, active, self.start_state[: self.system.nq], q, v)
+        return vanished(self.system, self._active(), self.start_state[: self.system.nq], q, v)
 
     def _whirling(self) -> list[int]:
         q, v = np.split(self.work["y"], [self.system.nq])
-        active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
         v0, t = self.start_state[self.system.nq :], float(self.state["t"][0])
-        return whirling(self.system, active, v0, q, v, t) if np.isfinite(self.work["y"]).all() else []
+        return whirling(self.system, self._active(), v0, q, v, t) if np.isfinite(self.work["y"]).all() else []
 
     def _finite_rows(self) -> int:
         """Rows before the first one that holds NaN or infinity: energies and powers steer no step, but are told."""
@@ -336,7 +338,7 @@ class CompiledRun:
         if outcome is Outcome.ILL_POSED:
             if rows := self._whirling():
                 return undirected(rows)
-            active = self._vanished() or np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
+            active = self._vanished() or self._active()
             return dependence(self.system, np.array(active), q, v)
         if outcome is Outcome.INCONSISTENT and abs(state["energy_open"]) > state["energy_allowed"]:
             why = (
@@ -358,9 +360,8 @@ class CompiledRun:
         row, end = self._finite_rows(), 1 + nq + self.system.n
         if row < state["rows"] and np.all(np.isfinite(self.buffers["out"][row, :end])):
             t, (q, v) = self.buffers["out"][row, 0], np.split(self.buffers["out"][row, 1:end], [nq])
-        active = np.flatnonzero(np.isin(self.buffers["mode"], _ACTIVE))
         ahead = min(max(float(self.options.t_end) - t, 0.0), within)
-        return not_finite(self.system, t, np.concatenate([q, v]), self.work["u"], self.model[0], active, ahead)
+        return not_finite(self.system, t, np.concatenate([q, v]), self.work["u"], self.model[0], self._active(), ahead)
 
 
 def _books_everything(system: System) -> bool:

@@ -6,11 +6,12 @@ as the mean of the step in which it acts: (J / T) pi / 2 sin(pi (t - t_0) / T) h
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Acts, Event, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
@@ -21,6 +22,7 @@ from crossbody.reports.measuring.truth import from_run
 
 PULSES, LENGTH, END = ((0.112, 0.7), (0.523, 0.4), (0.834, 0.1)), 3e-3, 1.0
 """When pulses begin, s, and their impulses, N s; how long each lasts, s, and the horizon."""
+TOTAL = sum(size for _, size in PULSES)
 FINE, COARSE = 201, 101
 """Samples of the truth in each pulse, and of an engine in all."""
 MORE, NEAR = 0.02, 1e-6
@@ -44,7 +46,7 @@ def pulses() -> Trajectory:
         on[first : last + 1] = True
         part = (t[first : last + 1] - begin) / LENGTH
         lam[first : last + 1] = 0.5 * np.pi * size / LENGTH * np.sin(np.pi * part)
-    return _row(t, lam, on, [(t, LENGTH) for t, _ in PULSES])
+    return _row(t, lam, on, [begin for begin, _ in PULSES])
 
 
 def held(acts: Acts, more: float = 1.0) -> Trajectory:
@@ -54,7 +56,7 @@ def held(acts: Acts, more: float = 1.0) -> Trajectory:
     for begin, size in PULSES:
         step = int(np.searchsorted(t, begin))  # at its end
         lam[step - (acts == Acts.BEHIND)] = more * size / (t[step] - t[step - 1])
-    return replace(_row(t, lam, lam > 0.0, ()), acts=acts)
+    return replace(_row(t, lam, lam > 0.0), acts=acts)
 
 
 def struck(more: float) -> Trajectory:
@@ -63,15 +65,16 @@ def struck(more: float) -> Trajectory:
     blows = tuple(
         Event(t=t, contact=0, before=Mode.FREE, after=Mode.COLLISION, impulse=more * size) for t, size in PULSES
     )
-    return replace(_row(t, np.zeros(len(t)), np.zeros(len(t), dtype=bool), ()), events=blows)
+    return replace(_row(t, np.zeros(len(t)), np.zeros(len(t), dtype=bool)), events=blows)
 
 
-def _row(t: Floats, lam: Floats, on: np.ndarray, touches: object) -> Trajectory:
+def _row(t: Floats, lam: Floats, on: NDArray[np.bool_], begun: Sequence[float] = ()) -> Trajectory:
+    """Return a motion of one row, with touches of `LENGTH` that have begun at some instants, s."""
     column, events = np.linspace(0.0, 1.0, len(t))[:, None], []
-    for begin, length in touches:  # type: ignore[attr-defined]
+    for begin in begun:
         events += [
             Event(t=begin, contact=0, before=Mode.FREE, after=Mode.CONTACT),
-            Event(t=begin + length, contact=0, before=Mode.CONTACT, after=Mode.FREE),
+            Event(t=begin + LENGTH, contact=0, before=Mode.CONTACT, after=Mode.FREE),
         ]
     return Trajectory(
         t=t, q=column, v=column, gap=column, lam=lam[:, None], energy=np.hstack([column, column]),
@@ -90,6 +93,6 @@ def _asked() -> Iterator[Asked]:
         for name in ("lam_impulse", "lam_impulse_path"):
             found = metrics.load(name).measure(truth, run, case)
             yield name, said, np.nan if found is None else float(found), wanted
-    late = replace(held(Acts.BEHIND), acts=Acts.BEFORE)  # each impulse comes a step early
+    late = replace(runs["right means"], acts=Acts.BEFORE)  # each impulse comes a step early
     found = metrics.load("lam_impulse_path").measure(truth, late, case)
-    yield "lam_impulse_path", "means of another step", np.nan if found is None else float(found), PULSES[0][1] / 1.2
+    yield "lam_impulse_path", "means of another step", np.nan if found is None else float(found), PULSES[0][1] / TOTAL
