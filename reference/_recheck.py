@@ -29,7 +29,7 @@ from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
 from crossbody.reference.options import Options
 from crossbody.reference.sundials.compiled import evaluation
-from crossbody.reference.sundials.compiled.evaluation import Kind
+from crossbody.reference.sundials.compiled.workspace import POINTS, Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 from crossbody.reference.sundials.evaluator import Evaluator
 from crossbody.reference.sundials.level_machine import DEEP, Guard, Term
@@ -213,7 +213,7 @@ class _Recheck:
             values[k], check[k] = work["grid"], work["check"]
         errors = np.abs(check[:, 2:] - check[:, :2]).max(axis=1)
         step = np.diff(run.t[first : last + 1])
-        places = (np.arange(evaluation.POINTS) + 0.5) / evaluation.POINTS
+        places = (np.arange(POINTS) + 0.5) / POINTS
         t = run.t[first:last, None] + step[:, None] * places
         at = 0
         for guard in guards:

@@ -8,7 +8,7 @@ from crossbody.cases import Mode, Outcome, Switch
 from crossbody.reference._system import System
 from crossbody.reference.kernels import CHANGED, GIVEN, LOST, START, TOUCHED
 from crossbody.reference.kinds import Floats
-from crossbody.reference.sundials.compiled.evaluation import Kind
+from crossbody.reference.sundials.compiled.workspace import Kind
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import Guard, Term
 

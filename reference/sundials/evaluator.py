@@ -10,11 +10,12 @@ import numpy as np
 from crossbody.cases import Outcome
 from crossbody.reference.kinds import Floats
 from crossbody.reference.sundials.compiled import evaluation
+from crossbody.reference.sundials.compiled.workspace import GOOD, ILL_POSED, NOT_FINITE, workspace
 from crossbody.reference.sundials.equations import Ended, Equations
 from crossbody.reference.sundials.level_machine import Guard
 
 NONE: Mapping[int, float] = MappingProxyType({})
-ENDS = {evaluation.ILL_POSED: Outcome.ILL_POSED, evaluation.NOT_FINITE: Outcome.NOT_FINITE}
+ENDS = {ILL_POSED: Outcome.ILL_POSED, NOT_FINITE: Outcome.NOT_FINITE}
 
 
 class Evaluator:
@@ -32,7 +33,7 @@ class Evaluator:
 
     def __init__(self, equations: Equations, terms: int, nz: int = 0) -> None:
         self.equations = equations
-        self.work, self.lines = evaluation.workspace(equations.system, equations.p, equations.u, terms, nz)
+        self.work, self.lines = workspace(equations.system, equations.p, equations.u, terms, nz)
         self.call = evaluation.entry(equations.system)
         self.values = np.zeros(terms)
 
@@ -43,7 +44,7 @@ class Evaluator:
             Ended: if the equations cannot be evaluated there.
         """
         code = self.call(what, t, y, self.values, self.lines)
-        if code == evaluation.GOOD or (what == evaluation.SCAN and code > 0):
+        if code == GOOD or (what == evaluation.SCAN and code > 0):
             return code
         raise Ended(ENDS[abs(code)], self.equations.active)
 

@@ -21,7 +21,8 @@ import numpy as np
 from crossbody.cases import Event, Mode, Outcome
 from crossbody.reference._system import System
 from crossbody.reference.kinds import Floats
-from crossbody.reference.sundials.compiled.evaluation import LIFTED, Kind
+from crossbody.reference.sundials.compiled.guards import LIFTED
+from crossbody.reference.sundials.compiled.workspace import Kind
 from crossbody.reference.sundials.equations import ACTIVE, ULP, Ended, Equations
 from crossbody.reference.sundials.sharing import CONSISTENT, Sharing, parted, rank, share
 

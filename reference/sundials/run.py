@@ -26,7 +26,8 @@ from crossbody.reference.kinds import Floats
 from crossbody.reference.notes import noted
 from crossbody.reference.options import Options
 from crossbody.reference.sundials.arcs import SHARE, Arc, BdfArc, CvodeArc, Fired, IdaArc, Scene, State
-from crossbody.reference.sundials.compiled.evaluation import entry, linear_arc
+from crossbody.reference.sundials.compiled.equations import linear_arc
+from crossbody.reference.sundials.compiled.evaluation import entry
 from crossbody.reference.sundials.discrete import GIVEN, START, TOUCHED, Discrete
 from crossbody.reference.sundials.equations import ULP, Ended, Equations
 from crossbody.reference.sundials.folds import Folds
