@@ -17,12 +17,13 @@ from crossbody.cases.control import Control
 from crossbody.cases.entry_points import checked_arguments, finite, wholes
 from crossbody.reference import kernels as kernel_types
 from crossbody.reference._activations import Activations
+from crossbody.reference._frictional_rows import frictional_rows
 from crossbody.reference._indices import different
+from crossbody.reference._structure import coupled, given_spans, parents, whole_blocks, whole_trees
 from crossbody.reference.kinds import Bytes, Floats, Index
 from crossbody.reference.systems import absent
 
 LARGEST = 1_000_000  # of every size of a system
-SLIPPERY = float(np.finfo(float).tiny)  # the coefficient in place of 0: rows slide with forces that no sum feels
 
 
 @dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, eq=False)
@@ -161,7 +162,8 @@ class System:
         put(self, "unilateral", self._row_field("unilateral", nc, np.int8))
         put(self, "follows", self._row_field("follows", nc, np.int64))
         put(self, "redundant", different("System.redundant", wholes("System.redundant", self.redundant), nc))
-        self._put_friction(nc)
+        for name, value in self._friction(nc).items():
+            put(self, name, value)
         self._check_told()
         if np.any(np.asarray(self.unilateral)[np.asarray(self.redundant)]):
             raise SceneError(
@@ -175,10 +177,10 @@ class System:
         put(self, "p", frozen("System", "p", np.concatenate([constants, state]), (None,)))
         put(self, "mass_block", self.mass_block or self.n)
         self._check_positions()
-        given = self._given_spans(nc)
-        put(self, "above", self._parents())
-        put(self, "trees", self._trees(given))
-        put(self, "span", self._blocks(given))
+        spans = given_spans(self.span, self.n, nc)
+        put(self, "above", parents(self.above, self.n, self.mass_block))
+        put(self, "trees", whole_trees(spans, np.asarray(self.above)))
+        put(self, "span", whole_blocks(spans, self.mass_block))
         put(self, "alpha", frozen("System", "alpha", np.column_stack([self.a0, self.a1, self.a2]), (nc, 3)))
         put(self, "beta", frozen("System", "beta", np.column_stack([self.b0, self.b1, self.b2]), (nc, 3)))
         self._check_values()
@@ -225,103 +227,17 @@ class System:
             given["control"] = control
         return {name: getattr(absent, name, None) if kernel is None else kernel for name, kernel in given.items()}
 
-    def _put_friction(self, nc: int) -> None:
-        """Find the tangential rows of every normal row and check that the machine can do what they ask."""
-        put, follows = object.__setattr__, np.asarray(self.follows)
-        given, drift = self._row_field("mu", nc, np.float64), self._row_field("drift", nc, np.float64)
-        if np.any(np.isnan(given)) or np.any(given < 0.0):
-            raise SceneError(
-                f"System.mu is {given.tolist()}; it must be at least 0, infinite where a row never slides."
-            )
-        loss = self._row_field("friction_loss", nc, np.float64)
-        if not np.all(np.isfinite(loss)) or np.any(loss < 0.0):
-            raise SceneError(f"System.friction_loss is {loss.tolist()}; it must be finite and at least 0.")
-        put(self, "friction_loss", loss)
-        dry, own = loss > 0.0, np.arange(nc)
-        slides = np.isfinite(given) & (follows >= 0) & ~dry
-        first, count, mu = np.where(dry, own, -1), dry.astype(np.int64), np.where(dry, loss, 0.0)
-        for normal in distinct(follows[slides]).tolist():
-            rows = np.flatnonzero(slides & (follows == normal))
-            if len(rows) > 2 or rows[-1] - rows[0] != len(rows) - 1 or len(set(given[rows].tolist())) > 1:
-                raise SceneError(
-                    f"Rows {rows.tolist()} follow row {normal} with mu = {given[rows].tolist()}; "
-                    "it has one or two tangential rows, one behind the other, of one mu."
-                )
-            if follows[normal] >= 0 or not np.asarray(self.unilateral)[normal]:
-                raise SceneError(f"Row {normal} has friction; it must be able to open and follow no other.")
-            # Rows without friction slide as well: left out here they would be held as long as the contact presses.
-            first[normal], count[normal], mu[normal] = rows[0], len(rows), max(given[rows[0]], SLIPPERY)
-        wrong = dry & ((np.asarray(self.unilateral) == 0) | ((follows >= 0) & (follows != own)))
-        wrong |= dry & np.isin(own, follows[(follows >= 0) & (follows != own)])
-        if np.any(wrong):
-            row = int(np.flatnonzero(wrong)[0])
-            raise SceneError(
-                f"Row {row} has dry friction of its own (System.friction_loss): it must not be always active, "
-                "must not follow another row, and no row may follow it."
-            )
-        put(self, "follows", np.where(dry, own, follows))  # it is its own tangential row
-        if not np.all(np.isfinite(drift)) or np.any(drift[~(slides | dry)] != 0.0):
-            raise SceneError(
-                f"System.drift is {drift.tolist()}; it must be finite, and 0 except for rows with friction."
-            )
-        put(self, "mu", frozen("System", "mu", given, (nc,)))
-        put(self, "friction", frozen("System", "friction", mu, (nc,)))
-        put(self, "drift", frozen("System", "drift", drift, (nc,)))
-        put(self, "tangent", frozen("System", "tangent", first, (nc,), np.int64))
-        put(self, "tangents", frozen("System", "tangents", count, (nc,), np.int64))
+    def _friction(self, nc: int) -> dict[str, Any]:
+        """The fields that say which rows rub, and how."""
+        mu, loss, drift = (self._row_field(name, nc, np.float64) for name in ("mu", "friction_loss", "drift"))
+        return frictional_rows(np.asarray(self.follows), np.asarray(self.unilateral) == 1, mu, loss, drift)
 
     def _row_field(self, name: str, nc: int, dtype: Any) -> Any:
         return full("System", name, getattr(self, name), nc, dtype)
 
-    def _given_spans(self, nc: int) -> Index:
-        """Columns that each row may touch."""
-        whole = [[0, self.n]] * nc if self.span is None else self.span
-        spans: Index = frozen("System", "span", whole if nc else np.zeros((0, 2)), (nc, 2), np.int64)
-        if np.any(spans[:, 0] < 0) or np.any(spans[:, 1] > self.n) or np.any(spans[:, 0] >= spans[:, 1]):
-            raise SceneError(f"System.span is {spans.tolist()}; each row needs 0 <= first < last <= {self.n}.")
-        return spans
-
-    def _blocks(self, spans: Index) -> Index:
-        """Columns that each row may touch, widened to whole blocks of the mass matrix."""
-        k = self.mass_block or self.n
-        blocks = np.column_stack([spans[:, 0] // k * k, -(-spans[:, 1] // k) * k])
-        whole_blocks: Index = frozen("System", "span", blocks, spans.shape, np.int64)
-        return whole_blocks
-
-    def _trees(self, spans: Index) -> Index:
-        """Columns that each row may touch, widened to whole trees of what M couples."""
-        first, last = np.arange(self.n), np.arange(1, self.n + 1)  # of the tree of every coordinate
-        for i, parent in enumerate(np.asarray(self.above).tolist()):
-            if parent >= 0:
-                first[i] = first[parent]
-        np.maximum.at(last, first, np.arange(1, self.n + 1))
-        wide = [(first[a:b].min(), last[first[a:b]].max()) for a, b in spans]
-        whole_trees: Index = frozen("System", "trees", np.reshape(wide, spans.shape), spans.shape, np.int64)
-        return whole_trees
-
-    def _parents(self) -> Index:
-        """Coordinates that M couples each one to, the nearest lower one; those before it in its block if not given."""
-        k, own = self.mass_block or self.n, np.arange(self.n)
-        chain = np.where(own % k == 0, -1, own - 1)
-        given: Index = frozen("System", "above", chain if self.above is None else self.above, (self.n,), np.int64)
-        wrong = (given >= own) | ((given < own // k * k) & (given != -1))
-        if np.any(wrong):
-            i = int(np.flatnonzero(wrong)[0])
-            raise SceneError(
-                f"System.above[{i}] is {given[i]}; valid: -1, or a lower coordinate of its block, "
-                f"{i // k * k} to {i - 1}."
-            )
-        return given
-
     def coupled(self) -> NDArray[np.bool_]:
         """Whether M, as it is stored (n, k), may have an entry: one coordinate is above the other, or the same."""
-        k, above = self.mass_block, np.asarray(self.above)
-        below = np.eye(k, dtype=bool)[np.arange(self.n) % k]
-        for i, c in enumerate(above):
-            if c >= 0:
-                below[i] |= below[c]
-        blocks = below.reshape(-1, k, k)
-        return (blocks | blocks.swapaxes(1, 2)).reshape(self.n, k)
+        return coupled(np.asarray(self.above), self.mass_block)
 
     def _check_sizes(self) -> None:
         counts = (
