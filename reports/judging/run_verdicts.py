@@ -439,17 +439,17 @@ def _row(
 def value_of(
     metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, case: Case
 ) -> tuple[float | None, float]:
-    """The number, and the part of the horizon over which the truth was asked for it, or is trusted."""
-    until = [truth.trusted]
+    """The number, and the part of the horizon over which the run and the truth were asked for it, or it is trusted."""
+    until, used = [truth.trusted], list[float]()
 
     def at(times: Floats) -> Trajectory:
         until.append(float(times[-1]) if len(times) else 0.0)
         return truth.at(times)
 
-    value = metric.measure(replace(truth, at=at), run, case)
+    value = metric.measure(replace(truth, at=at, used=used.append), run, case)
     if value is not None:
         instance(f"What measure of {name!r} returns", value, Real, "a number, NaN or None")
-    return value, min(min(until) / case.t_end, 1.0)
+    return value, min(min([truth.trusted, used[-1]] if used else until) / case.t_end, 1.0)
 
 
 def _split(judge_: Judge, wholes: Mapping[str, float]) -> Iterator[Verdict]:
