@@ -119,8 +119,9 @@ def multipliers(motion: Trajectory) -> tuple[Floats, None]:
 
 def impulse_upto(run: Trajectory, t: float) -> Floats:
     """Return the cumulative impulse of a motion at an instant, s, of its own clock (nc,), N s, with its collisions."""
-    found = [np.interp(t, run.t, one) for one in cumulative(run).T]
-    return collided(np.array([t]), np.array([found]), run.events)[0]
+    smooth = np.array([[np.interp(t, run.t, one) for one in cumulative(run).T]])
+    found: Floats = collided(np.array([t]), smooth, run.events)[0]
+    return found
 
 
 def stopping(run: Trajectory) -> NDArray[np.bool_]:
