@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from time import perf_counter
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from exudyn import itemInterface as items  # noqa: N813 - a module
 from exudyn.advancedUtilities import CreateSymbolicUserFunction
 
-from crossbody.cases import Case, CaseUnsupported, Outcome, Parameter, Trajectory
+from crossbody.cases import Acts, Case, CaseUnsupported, Outcome, Parameter, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.engines import _real_time
 from crossbody.engines import settings as _settings
@@ -189,7 +189,9 @@ def _integrator(
                 mbs.SetPreStepUserFunction(0)
         if begun[0] < limit:
             done, wall = solve()
-        return _trajectory(case, scene, model, done, begun[0], limit, wall)
+        found = _trajectory(case, scene, model, done, begun[0], limit, wall)
+        # Steps of one length go across touches, which are put in behind them, on one side each.
+        return replace(found, acts=Acts.GRID) if solver == exu.DynamicSolverType.GeneralizedAlpha else found
 
     return integrate
 

@@ -184,12 +184,30 @@ def _multipliers(made: MadeUp) -> Answers:
     for found, motion in ((mine, run), (theirs, exact)):
         for event in motion.events:
             found[motion.t[:k] > event.t, event.contact] += event.impulse
-    total = float(np.abs(mine[-1] - theirs[-1]).max()) / max(float(np.abs(theirs[-1]).max()), idle * made.case.t_end)
+    own, right = _totals(made)
+    total = float(np.abs(own - right).max()) / max(float(np.abs(right).max()), idle * made.case.t_end)
     path = float(np.abs(mine - theirs).max()) / max(float(np.abs(theirs).max()), idle * made.case.t_end)
     return {
         "lam_error": None if opens.any() else off / max(most, idle), "lam_impulse": total, "lam_impulse_path": path,
         "final_lam": float(sum(run.lam[-1])),
     }  # fmt: skip
+
+
+def _totals(made: MadeUp) -> tuple[Floats, Floats]:
+    """Return the impulses (nc,) of both up to one instant: that of the run's last sample for which the truth is known.
+
+    The truth's is that beside the run's last sample by then that has a truth, and what it comes to from there on.
+    """
+    run, exact = made.run, made.exact
+    last = max(i for i, t in enumerate(run.t) if t <= made.truth.trusted)
+    near, end = min(made.trusted - 1, last), run.t[last]
+    own, sums = integrals(run.t, run.lam)[last], integrals(made.t, exact.lam)
+    right = sums[near].copy()
+    right += [np.interp(end, made.t, one) - np.interp(made.t[near], made.t, one) for one in sums.T]
+    for found, motion in ((own, run), (right, exact)):
+        for event in motion.events:
+            found[event.contact] += event.impulse * (event.t <= end)
+    return own, right
 
 
 def _pulls(made: MadeUp) -> Answers:

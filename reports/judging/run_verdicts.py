@@ -11,12 +11,15 @@ from functools import cached_property
 from numbers import Real
 from typing import Any
 
+import numpy as np
+
 from crossbody import cases, engines
 from crossbody.cases import Case, CaseUnsupported, Claim, CrossbodyError, Limit, Trajectory, Value
 from crossbody.cases.arguments import instance
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
 from crossbody.reports import metrics
+from crossbody.reports.judging.acting import misacting
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.parts import LARGEST, PARTS, SPLIT, Split, Study, part_of, splits
@@ -280,6 +283,7 @@ def verdicts(
             return rows
     if not len(entry.run.t):
         return rows
+    rows += _outside_of_momenta(judge_, entry.run)
     run = truth.compared(entry.run)
     rows += _measured(judge_, run, truth)
     rows += _split(judge_, {row.metric: row.value for row in rows})
@@ -294,6 +298,17 @@ def _outside_of_clocks(judge_: Judge, entry: Entry) -> Iterator[Verdict]:
         yield judge_.row("time (control)", value, "s", Word.OUTSIDE, why, tier="")
     for value, wanted, why in miscounted(judge_.case, entry.settings, entry.clock.run):
         yield judge_.row("steps (control)", value, "1", Word.OUTSIDE, why, expected=float(wanted), tier="")
+
+
+def _outside_of_momenta(judge_: Judge, run: Trajectory) -> Iterator[Verdict]:
+    """Say that forces did not act when the run says."""
+    try:
+        with np.errstate(all="ignore"):  # a run that failed may end where squares overflow
+            found = list(misacting(judge_.case, judge_.entry.settings, run))
+    except np.linalg.LinAlgError:  # where masses vanish nothing tells what forces did
+        return
+    for value, why in found:
+        yield judge_.row("impulses (control)", value, "1", Word.OUTSIDE, why, tier="")
 
 
 def measured(case: Case, entry: Entry, truth: Truth) -> dict[str, float]:
@@ -439,17 +454,17 @@ def _row(
 def value_of(
     metric: metrics.Metric, name: str, truth: Truth, run: Trajectory, case: Case
 ) -> tuple[float | None, float]:
-    """The number, and the part of the horizon over which the truth was asked for it, or is trusted."""
-    until = [truth.trusted]
+    """The number, and the part of the horizon over which the run and the truth were asked for it, or it is trusted."""
+    until, used = [truth.trusted], list[float]()
 
     def at(times: Floats) -> Trajectory:
         until.append(float(times[-1]) if len(times) else 0.0)
         return truth.at(times)
 
-    value = metric.measure(replace(truth, at=at), run, case)
+    value = metric.measure(replace(truth, at=at, used=used.append), run, case)
     if value is not None:
         instance(f"What measure of {name!r} returns", value, Real, "a number, NaN or None")
-    return value, min(min(until) / case.t_end, 1.0)
+    return value, min(min([truth.trusted, used[-1]] if used else until) / case.t_end, 1.0)
 
 
 def _split(judge_: Judge, wholes: Mapping[str, float]) -> Iterator[Verdict]:

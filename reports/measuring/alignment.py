@@ -137,6 +137,7 @@ def aligned(
     """Which samples of the run (n,) have a counterpart that can be trusted, and the truth at them."""
     t = clock(truth, run, case, releases)
     inside = _known(truth, t)
+    truth.used(float(np.minimum(run.t, t)[inside].max(initial=0.0)))
     exact, (sides, by) = truth.at(t[inside]), _sides(truth, run, t[inside])
     if not np.array_equal(sides, exact.t):
         jumps = truth.at(sides)

@@ -94,19 +94,34 @@ def beside(run: Trajectory, exact: Trajectory, whole: Trajectory, signal: Signal
         whole: the truth at its own.
         signal: what is integrated.
     """
-    if not counts_itself(run, whole):
-        return cumulated(exact, *signal(exact))
+    return integrated(whole, signal, exact.t) if counts_itself(run, whole) else cumulated(exact, *signal(exact))
+
+
+def integrated(whole: Trajectory, signal: Signal, times: Floats) -> Floats:
+    """Return the integrals of a truth since its start (m, k), over its own samples, up to times (m,), s."""
     # What slides on behind a turn is known there: only the side in front of an instant is held.
     whole = _held(whole, 1 + np.flatnonzero(stopping(whole)[1:] & (np.diff(whole.t) > 0.0)))
     values, along = signal(whole)
     if whole.acts == Acts.AT:
-        return integrals(whole, values if along is None else values * along)(exact.t)
-    return np.stack([np.interp(exact.t, whole.t, one) for one in cumulated(whole, values, along).T], axis=1)
+        return integrals(whole, values if along is None else values * along)(times)
+    return np.stack([np.interp(times, whole.t, one) for one in cumulated(whole, values, along).T], axis=1)
 
 
 def true_impulse(run: Trajectory, exact: Trajectory, whole: Trajectory) -> Floats:
     """Return the cumulative impulse of the truth `beside` samples of a run (m, nc), N s, with its collisions."""
-    return collided(exact.t, beside(run, exact, whole, lambda motion: (motion.lam, None)), whole.events)
+    return collided(exact.t, beside(run, exact, whole, multipliers), whole.events)
+
+
+def multipliers(motion: Trajectory) -> tuple[Floats, None]:
+    """Return what acts where the impulse of all rows is asked for."""
+    return motion.lam, None
+
+
+def impulse_upto(run: Trajectory, t: float) -> Floats:
+    """Return the cumulative impulse of a motion at an instant, s, of its own clock (nc,), N s, with its collisions."""
+    smooth = np.array([[np.interp(t, run.t, one) for one in cumulative(run).T]])
+    found: Floats = collided(np.array([t]), smooth, run.events)[0]
+    return found
 
 
 def stopping(run: Trajectory) -> NDArray[np.bool_]:

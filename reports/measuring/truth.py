@@ -35,6 +35,7 @@ class Truth:
         at: the motion at nondecreasing times inside the horizon; an event's instant asked for
             twice gives both sides.
         expect: told at which instants it will be asked for, so that it may find them together.
+        used: told up to which instant of both clocks a run is compared, s; what is told last counts.
         agreement: metric -> how far the two sources of tier C are apart; empty for the others.
         trusted: until when the two sources of tier C agree, s: nothing is compared behind it (chaos).
         parted: when the two sources part, s; infinite if they never do.
@@ -59,6 +60,7 @@ class Truth:
     trajectory: Trajectory
     at: Callable[[Floats], Trajectory]
     expect: Callable[[Iterable[Floats]], None] = lambda asked: None
+    used: Callable[[float], None] = lambda until: None
     agreement: dict[str, float]
     trusted: float = math.inf
     parted: float = math.inf

@@ -22,8 +22,12 @@ from crossbody.reports.measuring.impulse import (
     away,
     before_stops,
     beside,
+    collided,
     counts_itself,
     cumulated,
+    impulse_upto,
+    integrated,
+    multipliers,
     true_impulse,
     with_collisions,
 )
@@ -39,20 +43,35 @@ def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Total impulse of the multipliers against the truth's, over the truth's.
 
     Max over rows of |INT lam dt - INT lam_truth dt| / max over rows of |INT lam_truth dt|, collisions that take no
-    time included; NaN where lam is unknown. Rows that carry nothing are measured by what is `idle`.
+    time included; NaN where lam is unknown. Each up to the same instant of its own clock: the last sample for which the
+    truth is known. Rows that carry nothing are measured by what is `idle`.
     """
-    inside, exact = aligned(truth, run, case)
-    if not inside.any():
+    last = int(np.searchsorted(run.t, min(truth.trajectory.t[-1], truth.trusted), side="right")) - 1
+    if last < 0:
         return None
     if np.isnan(run.lam).any():
         return math.nan
-    if not counts_itself(run, truth.trajectory):
-        run, exact = before_stops(run, exact)
-    mine, theirs = with_collisions(run, run.events)[inside][-1:], true_impulse(run, exact, truth.trajectory)[-1:]
+    mine, theirs = _totals(truth, run, case, last)
+    truth.used(t := float(run.t[last]))
     scale = float(np.max(np.abs(theirs), initial=0.0))
     least = idle(truth.trajectory) * case.t_end
     named = of_rows(case, "N s", "N m s")
-    return largest(np.abs(mine - theirs), run.t[inside][-1:], named, max(scale, least)) if scale else None
+    return largest(np.abs(mine - theirs)[None], np.array([t]), named, max(scale, least)) if scale else None
+
+
+def _totals(truth: Truth, run: Trajectory, case: Case, last: int) -> tuple[Floats, Floats]:
+    """Return the impulses (nc,) of a run and of its truth up to the instant of the run's `last` sample, N s.
+
+    Over the same samples by the same rule as far as they are beside each other, and by the truth's own from there on.
+    """
+    whole, end = truth.trajectory, run.t[[last]]
+    if counts_itself(run, whole):
+        return impulse_upto(run, end[0]), collided(end, integrated(whole, multipliers, end), whole.events)[0]
+    inside, exact = aligned(truth, run, case)
+    run, exact = before_stops(run, exact)
+    upto = min(int(np.count_nonzero(inside)) - 1, last)
+    rest = impulse_upto(whole, end[0]) - impulse_upto(whole, exact.t[upto])
+    return impulse_upto(run, end[0]), true_impulse(run, exact, whole)[upto] + rest
 
 
 def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
