@@ -48,3 +48,19 @@ def test_a_parameter_whose_unit_is_not_that_of_what_is_made_of_it_is_told(
         assert known_dimensions.wrong(name)
     finally:
         known_dimensions.wrong.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("name", "key"), [("tossed_cube", "off"), ("delta_impulse", "jz"), ("rolling_sphere", "speed")]
+)
+def test_a_parameter_that_moves_another_axis_than_it_says_is_told(
+    name: str, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = module(name)
+    other = {**own.PARAMETERS, key: replace(own.PARAMETERS[key], doc="along y")}
+    monkeypatch.setattr(own, "PARAMETERS", MappingProxyType(other))
+    known_units.wrong.cache_clear()
+    try:
+        assert [what for *_, what in known_units.wrong(name)] == [f"{key} of {name}, along y"]
+    finally:
+        known_units.wrong.cache_clear()
