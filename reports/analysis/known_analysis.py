@@ -20,15 +20,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from crossbody import cases
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Actuator, Body, Joint, Scene
 from crossbody.engines.linear import Tangent
 from crossbody.reference.linear import LinearModel
 from crossbody.reports.analysis import bode, numbers
-from crossbody.reports.analysis.counterparts import compared
+from crossbody.reports.analysis.counterparts import compared, counterparts
 from crossbody.reports.analysis.loci import limits, root_locus
-from crossbody.reports.analysis.places import Place, places
+from crossbody.reports.analysis.places import MOVING, Place, places
+from crossbody.reports.analysis.summary import MOVES, NEUTRAL, STABLE, UNSTABLE, summary
 from crossbody.reports.judging.asked import Asked, Found, unlike_by
 from crossbody.reports.judging.verdict import Word
 
@@ -42,7 +44,7 @@ OMEGA = np.array([0.1, 3.0, 6.2, 6.5, 40.0, 900.0])
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    kinds = (_weight, _responses, _ranks, _poles, _loci, _curves, _engines)
+    kinds = (_weight, _responses, _ranks, _poles, _words, _loci, _curves, _engines, _ball, _chain)
     return unlike_by(kinds, "analysis", "a model that ends in", SOLVED, 1e-3)
 
 
@@ -196,3 +198,57 @@ def _engines() -> Iterator[Asked]:
         for pair, sign in zip(sorted(pairs, key=lambda one: -one["imag"]), (1.0, -1.0), strict=True):
             yield "reference_imag", told, pair["reference_imag"], sign * math.sqrt(size**2 - decay**2)
             yield "imag", told, pair["imag"], sign * math.sqrt(size**2 * (1.0 + off) - decay**2)
+
+
+def _words() -> Iterator[Asked]:
+    """Yield how a model grows and whether that is said of it: by its sign, by nothing but rounding, or as it moves."""
+    for damping, name, word in (
+        (0.6, "rests", STABLE), (-0.6, "rests", UNSTABLE), (0.0, "rests", NEUTRAL), (-0.6, "moves", MOVES),
+    ):  # fmt: skip
+        place = _place(_model(damping=damping, stiffness=9.0), "at rest" if name == "rests" else f"at once{MOVING}")
+        place.trim, place.system = SimpleNamespace(residual=math.nan, active=[]), SimpleNamespace(unilateral=[])
+        (row,) = _rows(summary([place], cases.load("bouncing_ball")))
+        told = f"a damping of {damping:g} 1/s that {name}"
+        yield "verdict", told, float(row["verdict"] == word), 1.0
+        yield "growth", told, row["growth"], -0.5 * damping
+        yield "slowest", told, row["slowest"], 3.0
+        yield "fastest", told, row["fastest"], 3.0
+
+
+def _of_engines(found: tuple[Place, ...], what: str) -> Iterator[Asked]:
+    """Yield 1 for each way of an engine whose linear model is another one, or is not told, else 0."""
+    for row in _rows(counterparts(found)[0]):
+        wrong_ = row["verdict"] not in (Word.WITHIN.value, Word.EXPECTED.value)
+        yield "engine", f"{row['engine']}, {row['way']}, of {what}", float(wrong_), 0.0
+
+
+def _ball() -> Iterator[Asked]:
+    """Yield the law of a contact where a ball lies on it: at its surface."""
+    case = cases.load("bouncing_ball")
+    found = tuple(place for place in places(case) if place.model is not None)
+    yield "equilibria", "a ball that lies", float(len(found)), 1.0
+    for place in found:
+        for k, name in enumerate(("a0", "a1")):
+            yield "A", "a ball that lies", float(place.linearised(reduce=False).A[1, k]), -case.number(name)
+    yield from _of_engines(found, "a ball that lies")
+
+
+def _chain() -> Iterator[Asked]:
+    """Yield which engine has another linear model of a chain in space that hangs askew, on springs and by a motor."""
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8))
+    names = [f"link {i}" for i in range(len(axes))]
+    made = Scene(
+        bodies=tuple(
+            Body(name=name, parent=above, position=(0.0, 0.1, -0.5), mass=1.0 + i, com=(0.02, 0.1 * i, -0.2),
+                 inertia=(0.1, 0.2, 0.15, 0.01, 0.0, 0.02))
+            for i, (name, above) in enumerate(zip(names, ["", *names], strict=False))
+        ),
+        joints=tuple(
+            Joint(name=name, body=name, type="hinge", axis=axis, stiffness=(90.0, 0.0, 0.0), damping=(0.3, 0.0, 0.0))
+            for name, axis in zip(names, axes, strict=True)
+        ),
+        actuators=(Actuator(name="motor", joint=names[1], gear=(GEAR,)),), gravity=(0.0, 0.0, -GRAVITY),
+    )  # fmt: skip
+    found = places(case_of(made, name="made_up", t_end=0.01))
+    yield "equilibria", "a chain", float(len(found)), 1.0
+    yield from _of_engines(found, "a chain")

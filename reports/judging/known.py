@@ -37,7 +37,7 @@ OF_SCENES = ("judging.known_scenes", "judging.known_turns")
 """Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""
 OF_ENGINES, OF_DRIVES = ("judging.known_engines",), ("judging.known_drives",)
 """Of an engine that runs, beside: others are not imported for it; and of its motors, likewise with those of scenes."""
-OF_CASES = ("judging.known_units",)
+OF_CASES = ("judging.known_units", "judging.known_dimensions", "pages.known_drawn")
 """Of one of crossbody's own cases, that runs."""
 OF_CONTACTS = ("judging.known_contacts", "judging.known_flights", "judging.known_shares")
 COMPILES = "reference"

@@ -25,6 +25,8 @@ MOVES = {"wheel": -300.0, "finger": 0.2, "idle": 0.0, "rail": 0.05, "stop": 0.0}
 """How far joints move, rad and m."""
 SIZES = {"wheel": 300.0, "finger": 1.0, "idle": 1.0, "rail": 0.05, "stop": 0.05}
 """What they are measured by: the largest of their like, but no more than a radian, or their own."""
+RATES = {"wheel": 150.0, "finger": 0.5, "idle": 0.5, "rail": 0.025, "stop": 0.025}
+"""What their rates are measured by: of those that turn the part of the wheel's that a radian is of its turns."""
 SLOWER = {"finger": 0.2, "idle": 0.2, "rail": 0.05, "stop": 0.05}
 """The same of those beside which no wheel turns."""
 
@@ -39,15 +41,17 @@ def _beside_a_wheel() -> Iterator[Asked]:
     case = _case((*FLOATS, *MOVES))
     places = {f"{name} {x}": size for name, at in FLOATS.items() for x, size in zip("xyz", at, strict=True)}
     wanted = {f"{name} {x}": max(map(abs, at)) for name, at in FLOATS.items() for x in "xyz"} | SIZES
-    yield from _asked(case, _motion(case, places | MOVES), wanted)
+    truth = _motion(case, places | MOVES)
+    yield from _asked(case, truth, wanted)
+    own = {f"{name} {x}": max(map(abs, at)) / LASTS for name, at in FLOATS.items() for x in "xyz"}
+    yield from _rates(case, truth, own | {f"{name} r{x}": 1.0 / LASTS for name in FLOATS for x in "xyz"} | RATES)
 
 
 def _alone() -> Iterator[Asked]:
     case = _case(tuple(SLOWER))
     truth = _motion(case, MOVES)
     yield from _asked(case, truth, SLOWER)
-    rates = zip(SLOWER, scale_of_rates(truth, case).tolist(), strict=True)
-    yield from (("size", f"the rate of {name} in a scene", rate, SLOWER[name] / LASTS) for name, rate in rates)
+    yield from _rates(case, truth, {name: size / LASTS for name, size in SLOWER.items()})
 
 
 def _case(names: tuple[str, ...]) -> Case:
@@ -79,3 +83,8 @@ def _motion(case: Case, moves: Mapping[str, float]) -> Trajectory:
 def _asked(case: Case, truth: Trajectory, wanted: Mapping[str, float]) -> Iterator[Asked]:
     found = dict(zip((one.name for one in case.coordinates), scale_of(truth, case).tolist(), strict=True))
     yield from (("size", f"{name} in a scene", found[name], size) for name, size in wanted.items())
+
+
+def _rates(case: Case, truth: Trajectory, wanted: Mapping[str, float]) -> Iterator[Asked]:
+    found = dict(zip((one.name for one in case.velocities), scale_of_rates(truth, case).tolist(), strict=True))
+    yield from (("size", f"the rate of {name} in a scene", found[name], size) for name, size in wanted.items())

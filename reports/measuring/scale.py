@@ -95,17 +95,36 @@ def _of_joints(own: Floats, case: Case, scene: Scene) -> Floats:
 def scale_of_rates(exact: Trajectory, case: Case) -> Floats:
     """Return what velocities are measured by (nv,): the largest |v| of all that share a unit.
 
-    Where all of these rest, and the case names no larger rate, 1e-9 rad/s of a box that slides without turning say
-    nothing of how far another rate is off. What matters of that is where it leads: it is measured by the rate that
-    brings a coordinate as far as its position is measured by, over the horizon. A rotation is measured by a radian.
+    Of a scene joints are measured by the joints alone, those that turn little beside a wheel by as much less as their
+    positions are; and a floating body by itself, or by what brings it as far as its place is measured by over the
+    horizon. Where all of a unit rest, and the case names no larger rate, 1e-9 rad/s of a box that slides without
+    turning say nothing of how far another rate is off. What matters of that is where it leads: it is measured by the
+    rate that brings a coordinate as far as its position is measured by, over the horizon. A rotation is measured by a
+    radian.
     """
-    shared = of_like(np.max(np.abs(exact.v), axis=0, initial=0.0), case.velocities)
-    known = np.maximum(shared, least(case.velocities, rates=True))
+    own: Floats = np.max(np.abs(exact.v), axis=0, initial=0.0)
+    known = np.maximum(of_like(own, case.velocities), least(case.velocities, rates=True))
     sizes = scale_of(exact, case)
     for at in case.quaternions:
         sizes[at : at + 4] = 1.0
-    sizes = np.delete(sizes, [at + 3 for at in case.quaternions])
-    return np.where(known > RESTS, known, np.maximum(known, sizes / case.t_end))
+    leads = np.delete(sizes, [at + 3 for at in case.quaternions]) / case.t_end
+    found = np.where(known > RESTS, known, np.maximum(known, leads))
+    return found if case.scene is None else np.minimum(found, _rates_of_joints(own, leads, exact, case, case.scene))
+
+
+def _rates_of_joints(own: Floats, leads: Floats, exact: Trajectory, case: Case, scene: Scene) -> Floats:
+    """Return what each velocity (nv,) of a scene is measured by at most, by the largest of each and where they lead."""
+    places, rates = (np.array([WIDTHS[joint.type][k] for joint in scene.joints], dtype=int) for k in (0, 1))
+    kinds = np.array([joint.type for joint in scene.joints])
+    joints = of_like(np.where(np.repeat(kinds == "free", rates), 0.0, own), case.velocities)
+    most = np.where(joints > RESTS, joints, np.maximum(joints, leads))
+    starts = np.cumsum(rates) - rates
+    turned = np.abs(exact.q).max(axis=0)[(np.cumsum(places) - places)[kinds == "hinge"]]
+    most[starts[kinds == "hinge"]] *= np.maximum(turned, 1.0) / max(1.0, turned.max(initial=0.0))
+    most = np.maximum(most, own)
+    for at in (start + k for start in starts[kinds == "free"] for k in (0, 3)):
+        most[at : at + 3] = max(own[at : at + 3].max(), leads[at : at + 3].max())
+    return most
 
 
 def rounded(q: Floats) -> float:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reports.judging.asked import Found
-from crossbody.reports.pages import known_figures, known_playback, known_texts
+from crossbody.reports.pages import known_figures, known_playback, known_solids, known_texts
 from crossbody.reports.pages.made_up_traces import Said
 
 SHOWN, ROUNDED = 2e-4, 1e-6
@@ -23,8 +23,8 @@ SHOWN, ROUNDED = 2e-4, 1e-6
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return figure, number as it is drawn, least and most, and which number, where another one is drawn."""
-    kinds = (*known_figures.KINDS.items(), *known_playback.KINDS.items(), *known_texts.KINDS.items())
-    return tuple(found for name, ask in kinds for found in asked(name, ask))
+    modules = (known_figures, known_playback, known_solids, known_texts)
+    return tuple(found for module in modules for name, ask in module.KINDS.items() for found in asked(name, ask))
 
 
 def asked(name: str, ask: Callable[[], Iterator[Said]]) -> Iterator[Found]:

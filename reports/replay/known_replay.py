@@ -26,7 +26,7 @@ from crossbody.hw.models import load as load_model
 from crossbody.hw.models.contract import Segment
 from crossbody.hw.reading.columns import parse_columns
 from crossbody.hw.reading.stream import Rows, join
-from crossbody.hw.replaying import measures
+from crossbody.hw.replaying import measures, sensors
 from crossbody.hw.windows import rates
 from crossbody.hw.windows.whiteness import noise_level
 from crossbody.reports.judging.asked import Found, Within, unlike
@@ -113,7 +113,7 @@ WALL = 0.5
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    kinds = (_reading, _repaired, _joined, _measured, _link, _ball, _bounces, _impacts, _needed, _formed)
+    kinds = (_reading, _repaired, _joined, _sensed, _measured, _link, _ball, _bounces, _impacts, _needed, _formed)
     return unlike(kinds, "log", "a log that ends in")
 
 
@@ -197,6 +197,32 @@ def _joined() -> Iterator[Within]:
         for one, must in zip(found.tolist(), wanted, strict=True):
             yield "log", f"a signal that is joined by {how}", one, must, EXACT
         yield "log", "rows before a signal begins", float(lead), 0.0, 0.0
+
+
+def _sensed() -> Iterator[Within]:
+    """Yield what a sensor with a lag shows of a ramp and of a step, what it felt, and how well that is known.
+
+    With T = 1/ks it shows s (t - T (1 - e^(-t/T))) of a ramp s t, and 1 - e^(-t/T) of a step; of readings with noises
+    n that are c = e^(-dt/T) apart, (n' - c n)/(1 - c).
+    """
+    t, slope, lag, count = STEP * np.arange(40, dtype=np.float64), 3.0, 2.5 * STEP, 0.02
+    ramp, ones, told, more = (slope * t)[:, None], np.ones((len(t), 1)), "a sensor with a lag", 0.3 * count
+    gone, c = np.exp(-t / lag)[:, None], math.exp(-STEP / lag)
+    step = np.concatenate([np.zeros((1, 1)), ones[1:]])
+    late = np.maximum(t - LATE, 0.0)[:, None]
+    pairs = (
+        ("a ramp", sensors.Sensor(rate=1.0 / lag).read(t, ramp, slope * ones), ramp - slope * lag * (1.0 - gone)),
+        ("a step that holds", sensors.lagged(t, step, 1.0 / lag), np.maximum(1.0 - gone / c, 0.0)),
+        ("a ramp that is late", sensors.Sensor(delay=LATE).read(t, ramp, slope * ones), slope * late),
+        ("a ramp in counts", sensors.Sensor(quantum=count).read(t, ramp + more),
+         count * np.floor((ramp + more) / count + 0.5)),
+        ("what is felt", sensors.unlagged(t, sensors.lagged(t, step, 1.0 / lag), 1.0 / lag, NOISE).force, step[:-1]),
+        ("a noise", sensors.unlagged(t, ramp, 1.0 / lag, NOISE, count).std,
+         np.full((len(t) - 1, 1), math.sqrt((NOISE**2 + count**2 / 12.0) * (1.0 + c * c)) / (1.0 - c))),
+    )  # fmt: skip
+    for what, found, wanted in pairs:
+        worst = int(np.argmax(np.abs(found - wanted)))
+        yield "sensor", f"{told}: {what}", float(found[worst, 0]), float(wanted[worst, 0]), EXACT
 
 
 def _measured() -> Iterator[Within]:

@@ -90,6 +90,20 @@ def test_positions_are_off_by_the_part_of_the_largest_of_each(one: Drawn) -> Non
     assert one.measured("position") == pytest.approx(max(parts), rel=1e-6)
 
 
+def test_velocities_of_joints_are_off_by_a_part_of_their_like_as_their_positions_are(one: Drawn) -> None:
+    """Where something moves: of what turns by more than a radian by as much as turns by one, or by itself."""
+    case, k, exact = one.case, one.trusted, one.exact
+    if case.scene is None or case.quaternions:
+        return
+    units, own = [c.unit for c in case.velocities], np.abs(exact.v).max(axis=0)
+    turned = np.where(np.array(units) == "rad", np.maximum(np.abs(exact.q).max(axis=0), 1.0), 1.0)
+    like = largest_of_like(np.maximum(own, [c.rate for c in case.velocities]), units)
+    part = np.where(np.array(units) == "rad", turned / turned.max(), 1.0)
+    scale = np.minimum(like, np.maximum(own, largest_of_like(own, units) * part))
+    off = (np.abs(one.run.v[:k] - exact.v[:k]) / scale).max()
+    assert one.measured("velocity") == pytest.approx(off, rel=1e-6)
+
+
 def test_gaps_of_rows_are_off_by_a_part_of_their_own_or_of_the_largest(one: Drawn) -> None:
     k, run, exact, touches = one.trusted, one.run, one.exact, one.case.law.touches
     if touches.any():
