@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -221,6 +221,10 @@ class Force:
     fast: tuple[float, ...] = ()
 
 
+Prediction = Callable[[Mapping[str, Any]], float | str]
+"""Settings of an engine, none of them for its defaults -> what it is predicted to give, or what nothing predicts."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
     """How large one metric may be for one engine and profile, and why.
@@ -237,6 +241,8 @@ class Limit:
             limit is not judged.
         known_least: how far it takes it at least, where that is known beforehand; 0 where it is not.
         covers_none: whether the property explains too that a run has no such number where the truth has one.
+        predicts: how far it takes it by the engine's settings (`under`); None where they do not matter.
+        near: part of what is predicted by which a run may be off.
     """
 
     metric: str
@@ -248,6 +254,18 @@ class Limit:
     known_size: float = math.inf
     known_least: float = 0.0
     covers_none: bool = False
+    predicts: Prediction | None = None
+    near: float = 0.0
+
+    def under(self, settings: Mapping[str, Any]) -> Limit:
+        """Return the limit of a run with these settings; they have no size where nothing predicts one."""
+        if self.predicts is None:
+            return self
+        size = self.predicts(settings)
+        if isinstance(size, str):
+            known = f"{self.known}; no prediction for {size}"
+            return replace(self, known=known, known_least=0.0, known_size=math.inf)
+        return replace(self, known_least=size * (1.0 - self.near), known_size=size * (1.0 + self.near))
 
     def covers(self, engine: str, profile: str) -> bool:
         """Whether this limit judges that run."""

@@ -21,8 +21,9 @@ import numpy as np
 from crossbody.cases.arguments import shown
 from crossbody.cases.arrays import Floats
 from crossbody.cases.errors import SceneError
+from crossbody.cases.fields import Vector as Vector  # a name of this module too
+from crossbody.cases.fields import bounds, check_fields, parts, points, turn, vector
 
-Vector = tuple[float, ...]
 ZERO: Vector = (0.0, 0.0, 0.0)
 UPRIGHT: Vector = (1.0, 0.0, 0.0, 0.0)
 UNBOUNDED: Vector = (-math.inf, math.inf)
@@ -46,9 +47,10 @@ class RowLaw:
 
     def __post_init__(self) -> None:
         """Check that the constants are finite and not below 0."""
+        check_fields(self, "RowLaw.")
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if not (math.isfinite(value) and value >= 0.0):
+            if not value >= 0.0:
                 raise SceneError(f"RowLaw.{field.name} is {shown(value)}; it must be finite and at least 0.")
 
 
@@ -64,50 +66,17 @@ class _Named:
     sizes: ClassVar[dict[str, int]] = {}
 
     def __post_init__(self) -> None:
-        """Bring vectors to tuples of their length and check that every number but a bound is finite."""
+        """Check the type of every field, and that every number but a bound is finite; bring vectors to tuples."""
         what = f"{type(self).__name__} {self.name!r}"
         if not isinstance(self.name, str) or not self.name:
             raise SceneError(f"{type(self).__name__}.name is {shown(self.name)}; it must be a text.")
         for name, size in self.sizes.items():
-            check = _bounds if name.endswith("range") else _turn if name == "orientation" else _vector
+            check = bounds if name.endswith("range") else turn if name == "orientation" else vector
             object.__setattr__(self, name, check(f"{what}: {name}", getattr(self, name), size))
-        for field in dataclasses.fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, float) and not math.isfinite(value):
-                raise SceneError(f"{what}: {field.name} is {value}; it must be finite.")
-
-
-def _vector(where: str, value: Any, size: int) -> Vector:
-    found = _numbers(where, value, size)
-    if not all(map(math.isfinite, found)):
-        raise SceneError(f"{where} is {shown(value)}; it must be finite.")
-    return found
-
-
-def _turn(where: str, value: Any, size: int) -> Vector:
-    """Return a quaternion, of any length that is a number."""
-    found = _vector(where, value, size)
-    if not 0.0 < sum(number * number for number in found) < math.inf:
-        raise SceneError(f"{where} is {shown(value)}; a quaternion has a length above 0 that is finite.")
-    return found
-
-
-def _bounds(where: str, value: Any, size: int) -> Vector:
-    """Return the lowest and the highest value that something may have; infinite where there is no such bound."""
-    low, high = found = _numbers(where, value, size)
-    if not (low <= high and low < math.inf and high > -math.inf):
-        raise SceneError(f"{where} is {shown(value)}; it must be the lowest and the highest value.")
-    return found
-
-
-def _numbers(where: str, value: Any, size: int) -> Vector:
-    try:
-        found = tuple(float(number) for number in value)
-    except (TypeError, ValueError):
-        found = ()
-    if len(found) != size or any(map(math.isnan, found)):
-        raise SceneError(f"{where} is {shown(value)}; it must be {size} numbers.")
-    return found
+        check_fields(self, f"{what}: ")
+        law = getattr(self, "law", STIFF)
+        if not isinstance(law, RowLaw):
+            raise SceneError(f"{what}: law is {shown(law)}; it must be a RowLaw.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,8 +153,10 @@ class Joint(_Named):
             raise SceneError(f"Joint {self.name!r}: axis is {list(self.axis)}; it must not be zero.")
         object.__setattr__(self, "axis", tuple(number / length for number in self.axis))
         size = 4 if self.type in ("ball", "free") else 1
-        rest = UPRIGHT if size == 4 and len(self.rest) == 1 else self.rest
-        check = _turn if size == 4 else _vector
+        rest = vector(f"Joint {self.name!r}: rest", self.rest)
+        if size == 4 and len(rest) == 1:
+            rest = UPRIGHT
+        check = turn if size == 4 else vector
         object.__setattr__(self, "rest", check(f"Joint {self.name!r}: rest", rest, size))
         if size == 4 and self.limited:
             self._put_angle()
@@ -237,10 +208,10 @@ class Shape(_Named):
         _Named.__post_init__(self)
         _check_friction(self)
         what = f"Shape {self.name!r}"
-        if (self.type == "hull") != bool(self.corners):
-            raise SceneError(f"{what} of type {self.type!r} has {len(self.corners)} corners; only a hull has any.")
-        found = tuple(_vector(f"{what}: corner {k}", corner, 3) for k, corner in enumerate(self.corners))
+        found = points(f"{what}: corners", self.corners)
         object.__setattr__(self, "corners", found)
+        if (self.type == "hull") != bool(found):
+            raise SceneError(f"{what} of type {self.type!r} has {len(found)} corners; only a hull has any.")
         if found and not _thickness(found) > FLAT:
             raise SceneError(
                 f"{what} has {len(found)} corners that lie in one plane; a hull has at least four that do not."
@@ -383,22 +354,21 @@ class Tendon(_Named):
         _check_loss(self)
         if self.rest[0] > self.rest[1]:
             raise SceneError(f"{what}: rest is {list(self.rest)}; it must be the shortest and the longest length.")
-        object.__setattr__(self, "coefficients", _vector(f"{what}: coefficients", self.coefficients, len(self.joints)))
+        object.__setattr__(self, "coefficients", vector(f"{what}: coefficients", self.coefficients, len(self.joints)))
         if bool(self.joints) == bool(self.bodies) or len(self.bodies) not in (0, 2):
             raise SceneError(f"{what} has joints {list(self.joints)} and bodies {list(self.bodies)}; it needs either, "
                              "two of the latter.")  # fmt: skip
-        if len(self.positions) != len(self.bodies):
+        places = points(f"{what}: positions", self.positions)
+        if len(places) != len(self.bodies):
             raise SceneError(f"{what}: positions is {shown(self.positions)}; it must be a point of each body.")
-        points = tuple(_vector(f"{what}: positions", point, 3) for point in self.positions)
-        object.__setattr__(self, "positions", points)
+        object.__setattr__(self, "positions", places)
 
 
 def _check_loss(part: Joint | Tendon) -> None:
     """Check the bound of a part's dry friction."""
-    if not 0.0 <= part.friction_loss < math.inf:
+    if not part.friction_loss >= 0.0:
         raise SceneError(
-            f"{type(part).__name__} {part.name!r}: friction_loss is {part.friction_loss}; it "
-            "must be at least 0 and finite."
+            f"{type(part).__name__} {part.name!r}: friction_loss is {part.friction_loss}; it must be at least 0."
         )
 
 
@@ -451,7 +421,7 @@ class Actuator(_Named):
             )
         if (self.activation == "filter") != (0.0 < self.time_constant < math.inf):
             raise SceneError(f"{what}: time_constant is {shown(self.time_constant)}; only a filter has one, above 0 s.")
-        object.__setattr__(self, "gear", _vector(f"{what}: gear", self.gear, np.size(self.gear)))
+        object.__setattr__(self, "gear", vector(f"{what}: gear", self.gear))
         if not all(math.isfinite(gear * gear) for gear in self.gear):  # inertia at a joint goes by it
             raise SceneError(f"{what}: gear is {shown(self.gear)}; valid: numbers whose squares are finite.")
         if self.tendon and self.armature:
@@ -467,6 +437,12 @@ class Push(_Named):
     """
 
     body: str
+
+
+_GROUPS: dict[str, type[_Named]] = {
+    "bodies": Body, "joints": Joint, "shapes": Shape, "pairs": Pair, "loops": Loop, "tendons": Tendon,
+    "actuators": Actuator, "pushes": Push,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -494,9 +470,10 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Check that names are unique, that every name used is there, and the parts' order."""
-        object.__setattr__(self, "gravity", _vector("Scene.gravity", self.gravity, 3))
-        for group in ("bodies", "joints", "shapes", "pairs", "loops", "tendons", "actuators", "pushes"):
-            object.__setattr__(self, group, tuple(getattr(self, group)))
+        object.__setattr__(self, "gravity", vector("Scene.gravity", self.gravity, 3))
+        check_fields(self, "Scene.")
+        for group, kind in _GROUPS.items():
+            object.__setattr__(self, group, parts(f"Scene.{group}", getattr(self, group), kind))
             _unique(group, getattr(self, group))
         if len(self.bodies) > LARGEST:
             raise SceneError(f"The scene has {len(self.bodies)} bodies; at most {LARGEST} can be run.")

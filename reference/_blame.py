@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from crossbody.cases import Outcome
 from crossbody.reference._check import ARGUMENTS
 from crossbody.reference._guarded import entry
 from crossbody.reference._system import System
@@ -16,6 +17,11 @@ from crossbody.reference.systems import absent
 VANISHED = 1e-6  # part of H M^-1 H^T of a row at the start below which what moves the row is as good as nothing
 WHIRLS = 1e6  # radians by which a row would turn, at its rate now, in the time of the run: its direction is none,
 FASTER = 30.0  # where motions are so many times faster than at the start
+STUCK = (
+    Outcome.STEP_TOO_SMALL, Outcome.STEP_LIMIT, Outcome.TIME_LIMIT, Outcome.MODE_CYCLE, Outcome.INCONSISTENT,
+)  # fmt: skip
+"""How a run ends that hardly goes on, or whose forces jump."""
+SURFACE = 1e-9  # part of its radius to which a sphere's centre is on a solid's face
 LOOKS = 60  # states ahead, each twice as far as the one before
 
 
@@ -142,6 +148,26 @@ def undirected(rows: list[int]) -> str:
         f"Rows {rows} are in force where they have no direction, as the bound of a ball joint at angle 0 or a "
         "distance between points that meet: forces grow without bound near "
     )
+
+
+def buried(system: System, active: Index, q: Floats, v: Floats) -> str:
+    """Say which rows in force are so deep that their direction jumps (`System.cores`); empty if none is.
+
+    From the middle of a solid every way out is as near as another: the row turns for ever between two of them.
+    """
+    gap = system.gap(q, v)[0]
+    deep = [(i, *core) for i, core in system.cores.items() if i in active and gap[i] < -core[1] * (1.0 - SURFACE)]
+    return "; ".join(
+        f"the centre of the sphere of pair {name!r} (row {i}) is inside the solid, where the nearest side "
+        f"changes at once (gap {gap[i]:.6g} m, from {-depth:g} m on)"
+        for i, name, depth in deep
+    )
+
+
+KEEP_OUT = (
+    "No tolerance helps: keep the centre outside by a stiffer law of the pair (a0, a1), less load, or a start that is "
+    "not inside."
+)
 
 
 def dependence(system: System, active: Index, q: Floats, v: Floats) -> str:

@@ -15,7 +15,7 @@ from crossbody.cases import Event, Ledger, Mode, Outcome, Switch, Trajectory
 from crossbody.cases.control import Control, NotFinite
 from crossbody.reference import _dense
 from crossbody.reference._activations import Live
-from crossbody.reference._blame import dependence, not_finite, undirected, vanished, whirling
+from crossbody.reference._blame import KEEP_OUT, STUCK, buried, dependence, not_finite, undirected, vanished, whirling
 from crossbody.reference._dense import Marks, Motion
 from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._interrupt import LONG_S, Interrupts
@@ -324,6 +324,8 @@ class CompiledRun:
             return noted(state, bool(self.state["loops_press"][0]))
         q, v = np.split(self.work["y"], [self.system.nq])
         where = f"t = {float(self.state['t'][0]):.12g} s, q = {q.tolist()}, v = {v.tolist()}"
+        if outcome in STUCK and (deep := buried(self.system, self._active(), q, v)):
+            return f"At {where}, {deep}. {KEEP_OUT}"
         return f"{self._cause(outcome, q, v)}{where}. {outcome.advice}"
 
     def _cause(self, outcome: Outcome, q: Floats, v: Floats) -> str:

@@ -53,6 +53,7 @@ class System:
         loose: of each of these the part of it that does not follow, 0 if not given: so far its gap may open.
         findings: sentences on what was decided when the system was made; they stand in the
             message of every run.
+        cores: of each row whose direction jumps where it is deep: its name, and from which depth, m.
         follows (nc,): index of the row whose activity this one shares (a slip row follows its
             normal row); -1 none.
         mu (nc,): of a row that follows: coefficient of Coulomb friction. It is a tangential row, one
@@ -114,6 +115,7 @@ class System:
     redundant: ArrayLike = ()
     loose: ArrayLike = ()
     findings: tuple[str, ...] = ()
+    cores: Mapping[int, tuple[str, float]] = field(default_factory=dict)
     follows: ArrayLike = -1
     mu: ArrayLike = np.inf
     friction_loss: ArrayLike = 0.0

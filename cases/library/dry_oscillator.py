@@ -15,7 +15,8 @@ import numpy as np
 from crossbody.cases.arrays import Floats
 from crossbody.cases.case import Case, Parameter, Value
 from crossbody.cases.files.case import case_of
-from crossbody.cases.mechanisms.friction.limits import Soft, limits
+from crossbody.cases.mechanisms.friction.creeps import OfGuide
+from crossbody.cases.mechanisms.friction.limits import limits
 from crossbody.cases.mechanisms.friction.motions import Motion, Rows, Stage
 from crossbody.cases.scene import Body, Joint, RowLaw, Scene
 from crossbody.cases.trajectory import Mode
@@ -83,18 +84,6 @@ def oscillator(p: Mapping[str, float]) -> Motion | None:
     return Motion(stages, 1, energy, p["t_end"], before=first)
 
 
-def creep(p: Mapping[str, float], soft: Soft) -> float:
-    """Return how fast a mass that friction holds creeps at the horizon, m/s.
-
-    MuJoCo's row is a damper b v whose force a softness R = (1 - d)/d of the inverse mass limits,
-    d that of no depth: (1 + R) x'' + b x' + R k/m x = 0.
-    """
-    d = soft.impedance(0.0)
-    softness, rate = (1.0 - d) / d, p["stiffness"] / p["mass"]
-    slow, fast = sorted(np.roots([1.0 + softness, soft.damping, softness * rate]).real, key=abs)
-    return float(abs(p["start"] * slow * fast / (fast - slow) * math.exp(slow * p["t_end"])))
-
-
 PARAMETERS = {
     "mass": Parameter(default=2.0, unit="kg", doc="of the body", low=0.0, open_low=True),
     "stiffness": Parameter(default=50.0, unit="N/m", doc="of the spring", low=0.0),
@@ -129,6 +118,5 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     made = case_of(scene, name="dry_oscillator", variant=variant, q0=[p["start"]], v0=[p["speed"]], t_end=p["t_end"],
                    parameters=parameters)  # fmt: skip
     holds = p["speed"] == 0.0 and 0.0 < abs(p["stiffness"] * p["start"]) < p["friction_loss"]
-    return limits(
-        made, _TITLES[variant], PARAMETERS, oscillator(p), p, {("mujoco", "default"): creep(p, Soft())} if holds else {}
-    )
+    creeps = {("mujoco", "default"): OfGuide(p["stiffness"] / p["mass"], p["start"], p["t_end"])} if holds else {}
+    return limits(made, _TITLES[variant], PARAMETERS, oscillator(p), p, creeps)

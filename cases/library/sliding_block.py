@@ -12,10 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from crossbody.cases.case import Case, Limit, Parameter, Value
+from crossbody.cases.case import Case, Limit, Parameter, Prediction, Value
 from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction import blocks
-from crossbody.cases.mechanisms.friction.limits import Soft, creep, limits, mixed, regularised
+from crossbody.cases.mechanisms.friction.creeps import HOLDS, STICTION, OfMixing, OfPoint, OfRegularised
+from crossbody.cases.mechanisms.friction.limits import limits
 from crossbody.cases.mechanisms.friction.scene import NUMBERS, block_on_floor, field, point_on_floor
 
 PARAMETERS = {
@@ -64,9 +65,11 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     )  # fmt: skip
     holds = p["speed"] == 0.0 and not flat and p["mu"] > p["slope"] > 0.0
     down, _, press = field(p, p["slope"])
-    creeps = {
-        ("mujoco", "default"): creep(p["mu"], down / -press, -press, Soft(), elliptic=False),
-        ("dart", "matched"): mixed(down), **regularised(down / -press / p["mu"]),
+    creeps: dict[tuple[str, str], Prediction] = {
+        ("mujoco", "default"): OfPoint(p["mu"], down / -press, -press, p["t_end"]),
+        ("dart", "matched"): OfMixing(down),
+        ("drake", "default"): OfRegularised(down / -press / p["mu"], "lagged", STICTION),
+        ("drake", "matched"): OfRegularised(down / -press / p["mu"], "tamsi", HOLDS),
     } if holds else {}  # fmt: skip
     if flat:
         made = replace(made, limits=(*made.limits, _BEHIND))

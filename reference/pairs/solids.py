@@ -103,6 +103,11 @@ def box(C: Vector, M: Vector, X: Vector, Y: Vector, Z: Vector, size: Point, side
     D = apart(C, M)
     x, y, z = dot(X, D), dot(Y, D), dot(Z, D)
     a, b, c = _beyond(x, size[0], sides[0]), _beyond(y, size[1], sides[1]), _beyond(z, size[2], sides[2])
+    over_x, over_y, over_z = a[0].real != 0.0, b[0].real != 0.0, c[0].real != 0.0
+    if over_x + over_y + over_z == 1:  # over a face the vector keeps its direction where the distance vanishes
+        if over_x:
+            return _face(x, size[0], X)
+        return _face(y, size[1], Y) if over_y else _face(z, size[2], Z)
     square = add(add(times(a, a), times(b, b)), times(c, c))
     if square[0].real > 0.0:
         zero = scaled(0.0, a)

@@ -15,10 +15,19 @@ from types import MappingProxyType
 
 import numpy as np
 
-from crossbody.cases import InvalidValue, Ledger, Outcome, SceneError, Trajectory
+from crossbody.cases import InvalidValue, Ledger, Mode, Outcome, SceneError, Trajectory
 from crossbody.cases.control import Control, NotFinite
 from crossbody.reference._activations import Live
-from crossbody.reference._blame import dependence, not_finite, undirected, vanished, whirling
+from crossbody.reference._blame import (
+    KEEP_OUT,
+    STUCK,
+    buried,
+    dependence,
+    not_finite,
+    undirected,
+    vanished,
+    whirling,
+)
 from crossbody.reference._elapsed import Elapsed
 from crossbody.reference._redundant import watched
 from crossbody.reference._system import System
@@ -400,6 +409,10 @@ class SundialsRun:
         if outcome is Outcome.FINISHED:
             return noted({**self.machine.told, **self.touches.told, **self.touches.amounts})
         s = self.state
+        where = f"t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}"
+        on = np.flatnonzero(~np.isin([int(m) for m in self.machine.modes], (Mode.FREE, Mode.BALLISTIC)))
+        if outcome in STUCK and (deep := buried(self.system, on, s.q, s.v)):
+            return f"At {where}, {deep}. {KEEP_OUT}"
         rows = f"Rows {self.ended_rows}, " if self.ended_rows else ""
         if outcome is Outcome.NOT_FINITE:
             rows = self.failed or self._blamed()
@@ -407,7 +420,7 @@ class SundialsRun:
             active = np.array(self.ended_rows)
             gone = whirling(self.system, active, self.v0, s.q, s.v, s.t)
             rows = undirected(gone) if gone else dependence(self.system, active, s.q, s.v)
-        return f"{rows}t = {s.t:.12g} s, q = {s.q.tolist()}, v = {s.v.tolist()}. {outcome.advice}"
+        return f"{rows}{where}. {outcome.advice}"
 
     def _blamed(self) -> str:
         """The kernel that gave what is not finite, at the end of the motion or behind it."""

@@ -70,6 +70,17 @@ def _spans(scene: Scene, table: Table, nc: int) -> Index:
     return spans
 
 
+def _cores(scene: Scene, nc: int) -> dict[int, tuple[str, float]]:
+    """Return the rows of spheres whose centre may come into a solid, and from which depth, m."""
+    met = contacts(scene)
+    row, found = nc - sum(width for _, width in scene.dry) - sum(len(one.rows) for one in met), {}
+    for one in met:
+        if one.first.type == "sphere" and one.second.type in ("box", "cylinder"):
+            found[row] = one.pair.name, one.first.size[0] + one.pair.margin
+        row += one.places
+    return found
+
+
 def _tree(bodies: Mapping[str, Body], above: Mapping[str, int], name: str) -> int:
     """Return the first velocity of the tree that a body belongs to, -1 of the world's."""
     while name and name not in above:
@@ -116,7 +127,7 @@ def system(
         n=scene.nv, nq=scene.nq, above=dof_parents(table), span=_spans(scene, table, len(law.a0)),
         parameters=parameters, **turning,
         a0=law.a0, a1=law.a1, a2=law.a2, b0=law.b0, b1=law.b1, unilateral=law.unilateral,
-        **_friction(scene, len(law.a0)),
+        **_friction(scene, len(law.a0)), cores=_cores(scene, len(law.a0)),
         inputs=len(scene.inputs) + 2 * len(scene.activated), scratch=table.scratch, control=control,
         activations=activations(scene, act0) if scene.activated else None, **KERNELS, **row_kernels(paired),
     )  # fmt: skip

@@ -176,6 +176,7 @@ class Judge:
         found = limit_for(self.limits, metric, self.entry.engine, self.entry.profile)
         if found is None or metric in EXACT:
             return found
+        found = found.under(self.entry.settings)
         if metric == "rate_residual" and self.untold:
             return None
         grows, longer, looser = self.truth.grows, self.longer, min(self.looser, LOOSEST)

@@ -15,9 +15,12 @@ from crossbody.cases import Case, InvalidValue, Mode, Tier, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.library.rocking_block import flat_at
 from crossbody.reports import metrics
+from crossbody.reports.judging.comparison import judged
+from crossbody.reports.judging.run_verdicts import Judge
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.judging.verdict import Word, judge
 from crossbody.reports.measuring.truth import from_run, sample_times
+from crossbody.reports.runs import choice, jobs
 
 NAMES = (
     "sliding_block", "rolling_sphere", "rocking_block", "block_on_belt", "stacked_blocks", "held_weight",
@@ -215,6 +218,51 @@ def test_a_creep_that_is_predicted_has_two_bounds() -> None:
     assert value == pytest.approx(middle, rel=1e-2)
     for factor in (0.0, 0.9, 1.1):  # also where it is gone: what took it away may be in what measures it
         assert judge(factor * middle, found, None)[0] is Word.OUTSIDE
+
+
+SETTINGS = {
+    "cone": ("own", "elliptic", "pyramidal"), "impratio": (0.0, 0.5, 3.0, 100.0), "timeconst": (0.0, 0.005, 0.05),
+    "dt": (0.0005, 0.002, 0.006, 0.03), "noslip": (-1, 0),
+}  # fmt: skip
+CREEPING = [
+    ("sliding_block", "rests", "mujoco:default", {"mu": 0.6, "slope": 0.4}),
+    ("sliding_block", "rests", "mujoco:default", {"mu": 1.1, "slope": 0.2}),
+    ("sliding_block", "rests", "dart:matched", {}),
+    ("dry_oscillator", "holds", "mujoco:default", {"mass": 3.0}),
+]
+
+
+def word(case: cases.Case, pick: str, given: dict[str, Any]) -> tuple[Word, str, float, float]:
+    """Return what is said of a creep, why, the creep, and the middle of what a known property explains, m/s."""
+    result = jobs.run_case(case, choice.picks([pick]), settings=given, refine=False)
+    judge_ = Judge(result.case, result.entries[0], result.truth, "")
+    row = next(one for one in judged(result.case, result.entries, result.truth, "") if one.metric == "creep_speed")
+    limit = judge_.limit("creep_speed")
+    assert limit is not None
+    return Word(row.verdict), row.why, row.value, 0.5 * (limit.known_least + limit.known_size)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("name", "variant", "pick", "changed"), CREEPING)
+def test_a_creep_is_predicted_from_the_settings_in_use(
+    name: str, variant: str, pick: str, changed: dict[str, float], seed: int
+) -> None:
+    case, rng = cases.load(name, variant, **changed), np.random.default_rng([seed, len(name)])
+    pytest.importorskip("dartpy" if pick.startswith("dart") else "mujoco")
+    offered = engines.load(pick.split(":")[0]).offered(case, pick.split(":")[1])
+    given = {key: values[rng.integers(len(values))] for key, values in SETTINGS.items() if key in offered}
+    said, why, value, expected = word(case, pick, given)
+    assert (said, value) == (Word.EXPECTED, pytest.approx(expected, rel=0.05)), (given, why)
+
+
+@pytest.mark.parametrize(
+    ("given", "named"), [({"noslip": 50}, "noslip=50"), ({"timeconst": 0.5}, "a time constant of 0.5 s within 1 s")]
+)
+def test_a_creep_that_nothing_predicts_is_not_judged(given: dict[str, float], named: str) -> None:
+    said, why, value, _ = word(cases.load("sliding_block", "rests"), "mujoco:default", given)
+    assert said is Word.INFO
+    assert value > 1e-9
+    assert f"no prediction for {named}" in why
 
 
 def test_what_tips_has_no_exact_motion() -> None:

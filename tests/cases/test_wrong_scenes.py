@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import pytest
 
 from crossbody.cases import SceneError
-from crossbody.cases.scene import Actuator, Body, Joint, Loop, Pair, Scene, Shape, Tendon
+from crossbody.cases.scene import Actuator, Body, Joint, Loop, Pair, Push, RowLaw, Scene, Shape, Tendon
 
 PARTS: dict[type, dict[str, Any]] = {
     Body: {"name": "a"},
@@ -44,6 +46,42 @@ def test_every_number_of_a_part_is_finite_but_what_is_no_bound(
                 kind(**{**PARTS[kind], field: changed})
 
 
+EVERY: dict[type, dict[str, Any]] = {
+    **PARTS,
+    Push: {"name": "a", "body": "b"},
+    RowLaw: {"a0": 1.0, "a1": 1.0},
+    Scene: {},
+}
+STRANGE: dict[str, Any] = {
+    "text": "3", "none": None, "nan": math.nan, "inf": math.inf, "switch": True, "list": [1.0], "lists": [[1.0]],
+    "complex": 1j, "array": np.ones((2, 2)), "row": np.ones((3, 1)), "bytes": b"abc", "texts": ("1", "2", "3"),
+    "switches": (True, True, True), "complexes": (1j, 1j, 1j), "huge": 10**400, "mapping": {0.0: 1, 1.0: 2, 2.0: 3},
+    "object": object(), "kind": float, "alone": np.array(1.0),
+}  # fmt: skip
+MEANT = {  # what is no mistake: text where a text is meant, a list of numbers where any number of them is
+    "str": {"text"}, "bool": {"switch"}, "Vector": {"list"}, "tuple[str, ...]": {"texts"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("strange", STRANGE)
+@pytest.mark.parametrize("kind", EVERY)
+def test_every_field_of_a_part_refuses_what_it_is_not_declared_as(kind: type, strange: str) -> None:
+    for field in dataclasses.fields(kind):
+        if strange not in MEANT.get(str(field.type), set()):
+            with pytest.raises(SceneError, match=rf"^{kind.__name__}.*\b{field.name}\b"):
+                kind(**{**EVERY[kind], field.name: STRANGE[strange]})
+
+
+@pytest.mark.parametrize("kind", EVERY)
+def test_every_number_of_a_part_is_a_float_whatever_real_number_it_was_given_as(kind: type) -> None:
+    """Another type would stand in fingerprints and sentences as what it is."""
+    made = {"a0": 1.0, "a1": 1.0} if kind is RowLaw else EVERY[kind]
+    for field in dataclasses.fields(kind):
+        if field.type == "float" and field.name != "time_constant":
+            for one in (1, np.float32(1.0), np.int64(1), Fraction(1)):
+                assert type(getattr(kind(**{**made, field.name: one}), field.name)) is float
+
+
 WRONG: list[tuple[type, dict[str, Any], str]] = [
     (Body, {"name": ""}, "Body.name is ''; it must be a text"),
     (Body, {"com": (0.0, 0.0)}, "com is .*; it must be 3 numbers"),
@@ -61,7 +99,7 @@ WRONG: list[tuple[type, dict[str, Any], str]] = [
     (Joint, {"friction_loss": -1.0}, "friction_loss is -1.0; it must be at least 0"),
     (Shape, {"type": "hull"}, "has 0 corners; only a hull"),
     (Shape, {"type": "hull", "corners": [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]}, "lie in one plane"),
-    (Shape, {"type": "hull", "corners": [(0.0, 0.0, math.inf)]}, "corner 0 is .* must be finite"),
+    (Shape, {"type": "hull", "corners": [(0.0, 0.0, math.inf)]}, "corners: point 0 is .* must be finite"),
     (Pair, {"dimension": 2}, "dimension is 2; valid: "),
     (Pair, {"friction": (1e300, *[0.0] * 4)}, "friction is .* at most 1e.100"),
     (Pair, {"friction": (-0.1, *[0.0] * 4)}, "friction is .* at least 0"),

@@ -14,7 +14,9 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.mechanisms.friction.limits import NEAR, STEP, mixed, regularised
+from crossbody.cases.mechanisms.friction.creeps import HOLDS as SLOW
+from crossbody.cases.mechanisms.friction.creeps import STEP, STICTION, mixed, regularised
+from crossbody.cases.mechanisms.friction.limits import NEAR
 from crossbody.cases.scene import Body, Joint, Loop, Pair, Scene, Shape
 from crossbody.engines._rubbing import Push, Rubbing
 from crossbody.engines.equations import system_of
@@ -70,7 +72,11 @@ def test_every_closed_form_is_run(name: str, profile: str, case: str, variant: s
 def test_a_point_creeps_as_the_engines_parameters_say(name: str, profile: str, variant: str) -> None:
     case = cases.load("sliding_block", variant)
     found, mu, slope = ran(name, profile, case), 0.5, 0.4
-    expected = regularised(slope / mu) | {("dart", "matched"): mixed(G * np.sin(np.arctan(slope)))}
+    expected = {
+        ("drake", "matched"): regularised(slope / mu, "tamsi", SLOW),
+        ("drake", "default"): regularised(slope / mu, "lagged", STICTION),
+        ("dart", "matched"): mixed(G * np.sin(np.arctan(slope))),
+    }
     assert found.mode[-1, 0] == Mode.STICK
     assert np.linalg.norm(found.v[-1, :2]) == pytest.approx(expected[name, profile], rel=NEAR)
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from crossbody import cases, engines
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.files.case import case_of
-from crossbody.cases.mechanisms.friction.limits import Soft, creep
+from crossbody.cases.mechanisms.friction.creeps import Soft, creep
 from crossbody.cases.scene import Body, Joint, Pair, Scene, Shape
 from crossbody.engines.equations import system_of
 from crossbody.reports.judging.comparison import judged
