@@ -26,8 +26,8 @@ MOST_STEPS = 400_000
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
 OF_STUDIES, OF_FILES, DEARER = 2.0, 1.0, 3.0
-"""Time that all runs of a study of a scene may take, in budgets, and of a file, whose user waits for it, by what its own
-run took; one at a tight tolerance is taken to cost so many times as much."""
+"""Time that all runs of a study of a scene may take, in budgets, and of a file, whose user waits for it, by what its
+own run took; one at a tight tolerance is taken to cost so many times as much."""
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model of the scene."""
 
