@@ -35,7 +35,11 @@ def case(name: str) -> Named:
     source = loading.module(name)
     found = {variant: cases.load(name, variant) for variant in ((wanted,) if wanted else source.VARIANTS)}
     values = found[wanted].parameters if wanted else {}
-    parameters = {key: _parameter(each, values.get(key, each.default)) for key, each in source.PARAMETERS.items()}
+    idle = set.intersection(*map(_idle, found.values()))
+    parameters = {
+        key: _parameter(each, values.get(key, each.default))
+        for key, each in source.PARAMETERS.items() if key not in idle
+    }  # fmt: skip
     own = {key: f"{metric.doc} [{metric.unit}]" for one in found.values() for key, metric in one.metrics.items()}
     rows = {row: "" for one in found.values() for row in one.contacts}
     told = {
@@ -45,20 +49,33 @@ def case(name: str) -> Named:
     return {title: named for title, named in told.items() if named}
 
 
+def _idle(case: Case) -> set[str]:
+    """Return parameters of a file that nothing in it takes."""
+    if case.scene is None or not case.file:
+        return set()
+    from crossbody.cases.files.controls import movable
+
+    takes = {("ctrl", "control", "tick"): case.scene.actuators, ("rank", "assemble"): case.scene.loops}
+    takes |= {("push",): movable(case.scene), ("friction",): case.scene.pairs}
+    takes |= {("a0", "a1"): case.contacts or case.scene.pairs}
+    return {name for names, what in takes.items() if not what for name in names}
+
+
 def _of_scene(case: Case) -> Named:
     """Return rows that friction adds, and the names of what starts, is pushed and is driven in a file."""
     if case.scene is None or not case.file:
         return {}
     from crossbody.cases.files.case import rubbing
+    from crossbody.cases.files.controls import movable
 
-    rubs = rubbing(case)
+    rubs, can = rubbing(case), movable(case.scene)
     return {
         "Rows if its motion comes to a contact with friction": dict.fromkeys(
             () if rubs is None else [row for row in rubs.contacts if row not in case.contacts], ""
         ),
         "Coordinates (--start)": {one.name: one.unit for one in case.coordinates if one.unit != "1"},
         "Velocities (--rate)": {one.name: f"{one.unit}/s" for one in case.velocities},
-        "Bodies (--push)": {body.name: f"{body.mass:g} kg" for body in case.scene.bodies},
+        "Bodies (--push)": {body.name: f"{body.mass:g} kg" for body in case.scene.bodies if body.name in can},
         "Actuators (columns of --ctrl)": {
             one.name: "[{:g}, {:g}]".format(*one.control_range) for one in case.scene.actuators
         },

@@ -30,6 +30,8 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
     A CSV or Parquet table has a head, an NPZ t (m,) and ctrl (m, nu).
     """
     names = [actuator.name for actuator in scene.actuators]
+    if not names:
+        raise InvalidValue(f"Controls {path}: this file has no actuators that could take them (ctrl).")
     if not path.is_file():
         raise NoFile("table of controls", path)
     try:
@@ -156,6 +158,15 @@ def pushed(scene: Scene, inputs: Inputs | None, text: str) -> tuple[Scene, Input
     return scene, Inputs(names=scene.inputs, times=times, values=values)
 
 
+def movable(scene: Scene) -> list[str]:
+    """Return the bodies that joints move, their own or those of what they hang on."""
+    jointed, found = {joint.body for joint in scene.joints}, dict[str, None]()
+    for body in scene.bodies:  # behind those on which they hang
+        if body.name in jointed or body.parent in found:
+            found[body.name] = None
+    return list(found)
+
+
 def _push(text: str, scene: Scene) -> tuple[str, Floats, tuple[float, float]]:
     """Return body, force and times of a push."""
     body, *numbers = text.rsplit(maxsplit=5)
@@ -166,7 +177,9 @@ def _push(text: str, scene: Scene) -> tuple[str, Floats, tuple[float, float]]:
     if len(force) != 3 or not (np.isfinite(force).all() and 0.0 <= start < end):
         valid = "BODY FX FY FZ T0 T1 with finite forces and 0 <= T0 < T1"
         raise InvalidValue(f"push: {shown(text.strip())} is not a push; valid: {valid}.")
-    names = [one.name for one in scene.bodies]
-    if body.strip() not in names:
-        raise InvalidValue(f"push: there is no body {shown(body.strip())}; valid: {', '.join(names)}.")
+    names, can = [one.name for one in scene.bodies], movable(scene)
+    if body.strip() not in can:
+        why = f"{shown(body.strip())} is fixed: no joint moves it"
+        why = why if body.strip() in names else f"there is no body {shown(body.strip())}"
+        raise InvalidValue(f"push: {why}; valid: {', '.join(can) or 'none'}.")
     return body.strip(), np.array(force), (start, end)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 FLOOR = 1e-13  # errors below this are rounding: no order is fitted there
 EXACT = 1e-11
@@ -16,8 +17,9 @@ NEAR = 10.0
 SLACK = 0.5
 """How far below its promise an order may be seen: events at random places in a step scatter the errors."""
 CONVERGES = 0.5
-STAYS, LAST = 0.8, 3
-"""Part of the largest of the last errors before the finest by which that is at least smaller where a run converges."""
+STAYS, GROWS, LAST, GROWN = 0.8, 0.6, 3, 1.1
+"""Part of the largest of the last errors before the finest by which that is at least smaller where a run converges, and
+where its errors have begun to grow again, by so many times the least."""
 COLUMNS = ["case", "engine", "profile", "knob", "order", "promised", "says"]
 
 
@@ -57,14 +59,29 @@ def orders(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def stays(knob: str, settings: Sequence[float], errors: Sequence[float], known: float) -> str:
-    """Say where errors that are no rounding, nor what the truth is known to, do not fall any further; else nothing."""
+    """Say where errors that are no rounding, nor what the truth is known to, do not fall any further; else nothing.
+
+    The least of them may be one at which two parts of an error cancel: it is no floor, the finest is near it.
+    """
+    x, y = _falling(settings, errors)
+    if len(y) <= LAST or y[-1] <= max(EXACT, NEAR * known):
+        return ""
+    least, before = int(np.argmin(y)), float(y[-1 - LAST : -1].max())
+    grows = len(y) - least > 2 and bool((np.diff(y[least:]) > 0.0).all())
+    if y[-1] <= (GROWS if grows else STAYS) * before:
+        return ""
+    order = before_floor(settings, errors)
+    above = "" if math.isnan(order) else f"of order {order:.2g} above a floor of its own, "
+    end = "grows again" if grows and y[-1] > GROWN * y[least] else "does not fall"
+    at = x[least] if end == "grows again" else x[-LAST]
+    return f"does not converge to the truth of the case: {above}its error {end} below {knob} = {at:g}, near {y[-1]:.2g}"
+
+
+def _falling(settings: Sequence[float], errors: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Settings (n,) and errors (n,) that are finite, the coarsest first."""
     pairs = sorted(((x, y) for x, y in zip(settings, errors, strict=True) if math.isfinite(y)), reverse=True)
-    finest = [y for _, y in pairs][-LAST - 1 :]
-    if len(finest) <= LAST or finest[-1] <= NEAR * max(FLOOR, known) or finest[-1] <= STAYS * max(finest[:-1]):
-        return ""
-    if max(y for _, y in pairs) > NEAR * finest[-1]:  # an order, above a floor of its own
-        return ""
-    return f"does not converge to the truth of the case: its error does not fall below {knob} = {pairs[-LAST][0]:g}"
+    x, y = np.array(pairs, dtype=np.float64).reshape(-1, 2).T
+    return x, y
 
 
 def _known(rows: pd.DataFrame) -> float:

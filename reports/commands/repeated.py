@@ -77,7 +77,7 @@ def _read(command: str) -> Mapping[str, Any]:
 def _of_case(given: Mapping[str, Any], case: Case, t_end: float) -> Iterator[str]:
     """Yield what differs of a case that was followed to t_end, s."""
     (source,), variant, defined = given["names"], given["variant"], module(given["names"][0])
-    elsewhere = case.file and Path(source).absolute() != Path(case.file).absolute()
+    elsewhere = case.file and Path(source).resolve() != Path(case.file).resolve()
     if elsewhere or variant != case.variant or variant not in defined.VARIANTS:
         yield "case"
         return

@@ -28,9 +28,9 @@ SECOND = 10.0
 """Tolerance of the independent integrator that the truth is held against, in units of `Case.tight`."""
 WITNESS = 100.0
 """Tolerance of the witness that shares nothing but the scene, likewise: in Python steps cost 1e3 more."""
-OF_WITNESS, SHARE = 4.0, 0.05
-"""Time that a witness of a scene may take, in budgets, by what it takes for the first part of the horizon, and that
-part."""
+OF_WITNESS, OF_FILES, SHARE = 4.0, 1.5, 0.05
+"""Time that a witness of a scene may take, in budgets, and of a file, whose user waits for it, by what it takes for the
+first part of the horizon, and that part."""
 OF_KERNELS = 12.0
 """Time that CVODE may take of a case with kernels of its own, likewise: the slowest takes less than three."""
 NUDGE, DIRECTIONS, INSTANTS = 1e-7, 2, 201
@@ -135,7 +135,7 @@ def _integrated(case: Case, first: Trajectory, other: str, budget: float = BUDGE
     second = _second(case, truth, other, budget)
     t, grown = _growing(case, dense, budget)
     witness = ("reference", second.name) if second.name == other else ("", "")
-    known = replace(truth, tier=second.tier, grows=float(grown[-1]), witness=witness)
+    known = replace(truth, tier=second.tier, grows=float(grown[-1]), witness=witness, spent=second.spent)
     truth = held_against(known, second.run, case, second.rtol)
     if (horizon := _horizon(case, truth, second.run, t, grown)) is not None:
         known = replace(truth, horizon=horizon, grows=float(np.interp(horizon.until, t, grown)))
@@ -165,6 +165,7 @@ class _Source:
         shared: what it has in common with the truth.
         tier: how the truth is known by it.
         why: no other source that has less in common; empty where there is none.
+        spent: engine and profile that would have less in common, but took all its time; empty where there is none.
     """
 
     run: Trajectory
@@ -173,6 +174,7 @@ class _Source:
     shared: str
     tier: Tier
     why: str = ""
+    spent: tuple[str, str] = ("", "")
 
 
 def _second(case: Case, truth: Truth, other: str, budget: float) -> _Source:
@@ -180,17 +182,22 @@ def _second(case: Case, truth: Truth, other: str, budget: float) -> _Source:
     from crossbody.cases.scene_contacts import frictional
 
     why, rtol, known = "", SECOND * case.tight, _determined(case, truth.trajectory)
-    if other != "compiled":
+    spent = ("", "")
+    if case.general and truth.trajectory.outcome is Outcome.ILL_POSED:
+        why = "no other can tell which way a motion goes that the equations leave open"
+    elif other != "compiled":
         rubs = case.scene is not None and frictional(case.scene) is not None
-        limit = (OF_WITNESS if case.general else OF_KERNELS) * budget
+        of_scene = OF_FILES if case.file else OF_WITNESS
+        limit = (of_scene if case.general else OF_KERNELS) * budget
         found = _witness(case, limit) if case.general and not rubs else ""
         if isinstance(found, Trajectory):
             return _Source(found, "Pinocchio with CVODE", WITNESS * case.tight, "only the scene", Tier.C)
         run = _in_time(known, other, rtol, limit)
         if not (why := _left_out(truth, run, case, rubs)):
             return _Source(run, other, rtol, "only the equations of the mechanism", Tier.C, found)
+        spent = ("reference", other) if run.outcome is Outcome.TIME_LIMIT else spent
     run = _in_time(known, "compiled", rtol)
-    return _Source(run, "compiled", rtol, "equations, integrator and event location", Tier.D, why)
+    return _Source(run, "compiled", rtol, "equations, integrator and event location", Tier.D, why, spent)
 
 
 def _until(case: Case, t: float) -> Case:

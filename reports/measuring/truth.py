@@ -45,6 +45,7 @@ class Truth:
             not measured.
         tight: tolerance of the compiled run; NaN of another source.
         witness: engine and profile that it is held against; empty where that is no engine's own.
+        spent: engine and profile that would be the witness, but took all its time; empty where there is none.
         firm: until when slips are fast enough to tell the direction of their friction, s.
         part: of the horizon that was asked for, up to which the motion is followed.
         short: why no further; empty if to the horizon.
@@ -68,6 +69,7 @@ class Truth:
     growth: float = math.nan
     tight: float = math.nan
     witness: tuple[str, str] = ("", "")
+    spent: tuple[str, str] = ("", "")
     grows: float = 1.0
     firm: float = math.inf
     part: float = 1.0

@@ -215,10 +215,10 @@ def _ran(
     truth: Truth, left: float = 0.0,
 ) -> Entry:  # fmt: skip
     most = DEAR * budget
+    if bounded(case, pick) and (done := _done_beside(pick, truth)):
+        raise CaseUnsupported(done)
     if pick.every and (dear := _dear(case, pick, asked, most)):
         raise CaseUnsupported(dear)
-    if bounded(case, pick) and (pick.engine, pick.profile) == truth.witness:
-        raise CaseUnsupported(f"It is the witness of the truth. -e {pick.engine}:{pick.profile} runs it again.")
     prepared = prepare(case, pick, with_bound(case, pick, asked, budget))
     if why := runaway(case, prepared.settings, lambda first, more: prepare(first, pick, {**asked, **more})):
         stopped = replace(of_start(case, why), outcome=Outcome.STEP_LIMIT)
@@ -259,6 +259,16 @@ def _ran(
         hidden=hidden,
         own=law_of(prepared.follows) if refine and prepared.follows is not None else None,
     )
+
+
+def _done_beside(pick: Pick, truth: Truth) -> str:
+    """Return why a run would only repeat what was run for the truth; nothing where it would not."""
+    who = (pick.engine, pick.profile)
+    told = {
+        truth.spent: "As the witness of the truth it took all its time",
+        truth.witness: "It is the witness of the truth",
+    }
+    return f"{told[who]}. -e {pick.engine}:{pick.profile} runs it again." if who in told else ""
 
 
 def _dear(case: Case, pick: Pick, asked: Mapping[str, Value], most: float) -> str:

@@ -25,9 +25,9 @@ MOST_STEPS = 400_000
 """Steps of a run up to which a step is halved further while its study is not settled: what it keeps in memory."""
 STUDY_S = 20.0
 """Time that a run of a study may take, s: an integrator that grinds to a halt at 1e-12 has none."""
-OF_STUDIES, DEARER = 2.0, 3.0
-"""Time that all runs of a study of a scene may take, in budgets, by what its own run took; one at
-a tight tolerance is taken to cost so many times as much."""
+OF_STUDIES, OF_FILES, DEARER = 2.0, 1.0, 3.0
+"""Time that all runs of a study of a scene may take, in budgets, and of a file, whose user waits for it, by what its
+own run took; one at a tight tolerance is taken to cost so many times as much."""
 READER = "reader"
 """Setting of an engine that reads files by itself: "file", or "scene" for the model of the scene."""
 
@@ -66,7 +66,7 @@ def refined(
     if not size:
         return Study(why="It has neither a step nor a tolerance that can be refined.", **told)
     setting, own = next(iter(size.items()))
-    most = OF_STUDIES * budget if case.general else math.inf
+    most = (OF_FILES if case.file else OF_STUDIES) * budget if case.general else math.inf
     samples = {"samples": np.array(judged.t[judged.t <= case.t_end])} if "samples" in settings else {}
     known = {} if setting == "rtol" else {own: built if of_scene else natural}
 

@@ -111,3 +111,30 @@ def test_metrics_and_suites_that_list_names_are_described() -> None:
 def test_an_unknown_case_is_a_sentence() -> None:
     with pytest.raises(cases.UnknownName, match="There is no case 'newton'"):
         described.case("newton")
+
+
+MOTOR = '<actuator><motor name="m" joint="j"/></actuator>'
+FIXED = '<mujoco><worldbody><body name="base"><geom size=".1"/><body name="arm"><joint name="j"/>'
+ARM = FIXED + '<geom size=".1" pos="0 0 .5" contype="0" conaffinity="0"/></body></body></worldbody>{0}</mujoco>'
+
+
+@pytest.mark.parametrize("driven", [True, False])
+def test_what_nothing_in_a_file_takes_is_neither_offered_nor_taken(tmp_path: Path, driven: bool) -> None:
+    path, table, law = (tmp_path / name for name in ("arm.xml", "c.csv", "c.py"))
+    path.write_text(ARM.format(MOTOR if driven else ""))
+    table.write_text("t,m\n0,1\n")
+    law.write_text("def f(t, q, v):\n    return [0.0]\n")
+    told = described.case(str(path))
+    offered = {"ctrl", "control", "tick"} & told["Parameters"].keys()
+    assert offered == ({"ctrl", "control", "tick"} if driven else set())
+    assert not {"rank", "assemble"} & told["Parameters"].keys(), "it has no loops"
+    assert list(told["Bodies (--push)"]) == ["arm"]
+    for given in ({"ctrl": str(table)}, {"control": f"{law}:f"}):
+        if driven:
+            assert cases.load(str(path), "reference", **given).scene is not None
+        else:
+            with pytest.raises(cases.CrossbodyError, match="has no actuators"):
+                cases.load(str(path), "reference", **given)
+    with pytest.raises(cases.InvalidValue, match="'base' is fixed: no joint moves it; valid: arm"):
+        cases.load(str(path), "reference", push="base 1 0 0 0 .1")
+    assert cases.load(str(path), "reference", push="arm 1 0 0 0 .1").inputs is not None

@@ -99,3 +99,17 @@ def test_cases_that_are_called_otherwise_than_their_files_are_told_by_these(tmp_
     names = choice.sources(["newtons_cradle", *paths], None)
     loaded = choice.load_cases(["newtons_cradle", *paths], None, {})
     assert [case.file or case.name for case in loaded] == list(names)
+
+
+@pytest.mark.parametrize("way", ["{0}/arm.xml", "{0}/b/../arm.xml", "{0}/link.xml", "{0}/other/arm.xml"])
+def test_a_file_is_the_same_by_whatever_path_it_is_named(tmp_path: Path, way: str) -> None:
+    text = '<mujoco><worldbody><body name="b"><joint type="hinge"/><geom size=".1"/></body></worldbody></mujoco>'
+    (tmp_path / "arm.xml").write_text(text)
+    (tmp_path / "b").mkdir()
+    (tmp_path / "link.xml").symlink_to(tmp_path / "arm.xml")
+    (tmp_path / "other").symlink_to(tmp_path)
+    source = way.format(tmp_path)
+    case = load(source, "reference")
+    command = repeated.repeat(case, source, (), None, BUDGET, case.t_end)
+    rows: Any = [{"command": command, "engine": "truth", "profile": ""}]
+    repeated.check(rows, case, SimpleNamespace(entries=(), case=case), None, {}, BUDGET)
