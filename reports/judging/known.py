@@ -31,7 +31,7 @@ KINDS = (
     "pages.known_pages", "judging.known_verdicts", "judging.known_audits", "judging.known_arithmetic",
     "judging.known_samples", "judging.known_places", "judging.known_sizes",
 )  # fmt: skip
-OF_FILES = ("judging.known_files", "judging.known_margins", "pages.known_hulls")
+OF_FILES = ("judging.known_files", "judging.known_margins")
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
 OF_SCENES = ("judging.known_scenes", "judging.known_turns")
 """Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""

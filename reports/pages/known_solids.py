@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -54,19 +54,9 @@ def _stage(*bodies: Body, shapes: tuple[Shape, ...] = ()) -> scenes.Stage:
 
 def solids() -> Iterator[Said]:
     """Yield how far shapes reach, whose they are, and which line joins a body to that it hangs on."""
-    yield from _solids(kind for kind in REACH if kind != "hull")
-
-
-def hulls() -> Iterator[Said]:
-    """Yield the same of hulls, whose sides are found by a library that takes a third of a second to import."""
-    yield from _solids(["hull"])
-
-
-def _solids(kinds: Iterable[str]) -> Iterator[Said]:
     even, R = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), _turned()
     bodies = (Body(name="one", mass=1.0, inertia=even), Body(name="two", parent="one", mass=1.0, inertia=even))
-    for kind in kinds:
-        reach = REACH[kind]
+    for kind, reach in REACH.items():
         size = (0.0, 0.0, 0.0) if kind == "hull" else (A, B, C)
         corners = CORNERS if kind == "hull" else ()
         shape = Shape(name="s", body="two", type=kind, size=size, position=AT, orientation=TURN, corners=corners)
