@@ -6,11 +6,14 @@ power of friction: sums over samples do not show it. But M dv - dt f is what for
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from crossbody.cases import Acts, Case, Trajectory
-from crossbody.reports.measuring.momenta import unexplained
+from crossbody.reports.measuring.momenta import unexplained, unseen
 
 FAR = 0.25
 """Part of half of a change of forces from which on momenta are not explained; of a wrong rule it is 1 or 2."""
@@ -18,6 +21,10 @@ NEARER = 0.25
 """Part of what a rule leaves unexplained that another must, to be the right one."""
 COARSE = 0.4
 """Part that trapezoids of steps may leave where samples are told to show both sides of every jump."""
+SUMS = ("lam_impulse", "lam_impulse_path", "friction_impulse", "friction_work")
+"""Metrics that add up forces over samples."""
+SEEN = 1e-6
+"""Part of impulses to which sums must see them to be judged: to that limits hold."""
 LIGHT = 1e-6
 """Part of all that moves below which forces do not change."""
 SAID = {
@@ -47,3 +54,14 @@ def misacting(case: Case, settings: Mapping[str, Any], run: Trajectory) -> Itera
         )
     elif run.acts == Acts.AT and "dt" in settings and found.whole[Acts.AT] > COARSE:
         yield found.whole[Acts.AT], f"{said} {found.whole[Acts.AT]:.3g} of the largest of their changes unexplained."
+
+
+def uncertain(case: Case, run: Trajectory) -> Mapping[str, str]:
+    """Return which sums of forces samples do not tell, and why: those of a grid between whose instants forces jump.
+
+    A step of Runge-Kutta's method takes forces inside of it that no sample shows.
+    """
+    if run.acts != Acts.GRID or not np.isfinite(run.lam).all() or not (part := unseen(run, case)) > SEEN:
+        return {}
+    most = f"up to {part:.2g} of what velocities gained by them" if math.isfinite(part) else "nothing tells how much"
+    return dict.fromkeys(SUMS, f"Its forces jump between samples: sums by trapezoids leave out, or add, {most}.")

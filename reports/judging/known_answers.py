@@ -6,7 +6,8 @@ rule that cancels between a run and a truth, or that no engine makes use of, com
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from types import MappingProxyType
@@ -187,12 +188,21 @@ def _multipliers(made: MadeUp) -> Answers:
         for event in motion.events:
             found[motion.t[:k] > event.t, event.contact] += event.impulse
     own, right = _totals(made)
-    total = float(np.abs(own - right).max()) / max(float(np.abs(right).max()), idle * made.case.t_end)
-    path = float(np.abs(mine - theirs).max()) / max(float(np.abs(theirs).max()), idle * made.case.t_end)
+    total = _largest(made, [own - right]) / max(_largest(made, [right]), idle * made.case.t_end)
+    path = _largest(made, mine - theirs) / max(_largest(made, theirs), idle * made.case.t_end)
     return {
         "lam_error": None if opens.any() else off / max(most, idle), "lam_impulse": total, "lam_impulse_path": path,
         "final_lam": float(sum(run.lam[-1])),
     }  # fmt: skip
+
+
+def _largest(made: MadeUp, values: Iterable[Floats]) -> float:
+    """Return the largest size of values of rows (nc,): of both tangents of a place its length."""
+    names = made.case.contacts
+    pairs = [(k, k + 1) for k in range(len(names) - 1) if names[k].endswith(" t1") and names[k + 1].endswith(" t2")]
+    return max(
+        max([*np.abs(one).tolist(), *(math.hypot(one[i], one[j]) for i, j in pairs)], default=0.0) for one in values
+    )
 
 
 def _totals(made: MadeUp) -> tuple[Floats, Floats]:
@@ -201,7 +211,7 @@ def _totals(made: MadeUp) -> tuple[Floats, Floats]:
     The truth's is that beside the run's last sample by then that has a truth, and what it comes to from there on.
     """
     run, exact = made.run, made.exact
-    last = max(i for i, t in enumerate(run.t) if t <= made.truth.trusted)
+    last = max(i for i, t in enumerate(run.t) if t <= min(made.truth.trusted, made.t[-1]))
     near, end = min(made.trusted - 1, last), run.t[last]
     own, sums = integrals(run.t, run.lam)[last], integrals(made.t, exact.lam)
     right = sums[near].copy()

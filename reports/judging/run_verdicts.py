@@ -19,7 +19,7 @@ from crossbody.cases.arguments import instance
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
 from crossbody.reports import metrics
-from crossbody.reports.judging.acting import misacting
+from crossbody.reports.judging.acting import misacting, uncertain
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.parts import LARGEST, PARTS, SPLIT, Split, Study, part_of, splits
@@ -177,7 +177,7 @@ class Judge:
         if found is None or metric in EXACT:
             return found
         found = found.under(self.entry.settings)
-        if metric == "rate_residual" and self.untold:
+        if metric in self.untold:
             return None
         grows, longer, looser = self.truth.grows, self.longer, min(self.looser, LOOSEST)
         times, why = longer * looser, found.why
@@ -199,6 +199,12 @@ class Judge:
     @cached_property
     def untold(self) -> Mapping[str, str]:
         """What samples of this run, or of its truth, are too far apart to tell, and why."""
+        run = self.entry.run
+        return {**self._rates, **({} if run is None else uncertain(self.case, run))}
+
+    @property
+    def _rates(self) -> dict[str, str]:
+        """Why rates are not told, if they are not."""
         stated = limit_for(self.limits, "rate_residual", self.entry.engine, self.entry.profile)
         own = metrics.load("rate_residual").measure(self.truth, self.truth.trajectory, self.case)
         if self.looser > 1.0:
@@ -229,7 +235,7 @@ class Judge:
         word, why = judge(value, limit, claim, stored, factor)
         if math.isfinite(value):
             word, why = self.told(metric, word, why)
-        if word is Word.INFO and limit is None:
+        if word is Word.INFO and limit is None and metric not in self.untold:
             shown = limit_for(self.limits, "*", self.entry.engine, self.entry.profile)
             word, why = as_stored(value, shown, stored, factor)
         known = self.case.chaos or self.truth.horizon

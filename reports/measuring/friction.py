@@ -99,6 +99,16 @@ def _pairs(case: Case, count: int) -> NDArray[np.intp]:
     return np.array([*found, *(len(met) + np.arange(dry))]) if len(found) + dry == count else np.arange(count)
 
 
+def whole(values: Floats, case: Case) -> Floats:
+    """Return sizes of values of rows (n, nc): of friction in a plane its length, whichever way its two rows point."""
+    found, system = np.abs(values), equations(case)
+    if system is not None:
+        for row in np.flatnonzero(system.tangents > 1):
+            ways = slice(int(system.tangent[row]), int(system.tangent[row] + system.tangents[row]))
+            found[:, ways] = np.linalg.norm(values[:, ways], axis=1, keepdims=True)
+    return found
+
+
 def sliding(run: Trajectory, found: Rubbing) -> tuple[NDArray[np.bool_], Floats, Floats]:
     """Return where slip has a direction (n, m), and speeds and forces (n, m), m/s and N.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Acts, Case, Inputs, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.measuring.equations import equations, finite
+from crossbody.reports.measuring.scale import of_like
 
 if TYPE_CHECKING:
     from crossbody.reference import System
@@ -28,8 +30,8 @@ SHORT = 1e-6
 
 TINY = 1e-300
 """In place of the energy of forces that push nothing."""
-DEPENDENT = 1e-10
-"""Part of the largest eigenvalue of H M^-1 H' below which rows depend on each other."""
+TOGETHER = 256
+"""Steps whose equations are asked for at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,18 +72,23 @@ def unexplained(run: Trajectory, case: Case) -> Unexplained | None:
     )
 
 
-def untold_impulse(run: Trajectory, case: Case) -> float:
-    """Return what trapezoids of the samples leave of the impulses of rows at most, N s, by what velocities gained.
+def unseen(run: Trajectory, case: Case) -> float:
+    """Return which part of impulses trapezoids of the samples do not see, or make up, by what velocities gained.
 
-    The largest part of rows in sums over steps of (H M^-1 H')^+ H (dv - dt M^-1 (f + H' lam)); 0 where nothing is told.
+    The largest sum over steps of M dv - dt (f + H' lam), over that of dt H' lam of coordinates of its unit;
+    infinite where nothing tells it.
     """
     if (system := _told(run, case)) is None:
-        return 0.0
-    at = np.flatnonzero(np.diff(run.t) > 0.0)
-    M, left, _, _ = _left(system, run, at, _inputs(system, run, case))
-    H = system.equations_along(run.t[at], run.q[at], run.v[at])[2]
-    shares = np.linalg.pinv(H @ np.linalg.solve(M, H.swapaxes(1, 2)), rcond=DEPENDENT, hermitian=True) @ H
-    return float(np.max(np.abs(np.cumsum(np.einsum("mkn,mn->mk", shares, left[Acts.AT]), axis=0)), initial=0.0))
+        return math.inf
+    inputs, steps = _inputs(system, run, case), np.flatnonzero(np.diff(run.t) > 0.0)
+    off, pushed = [], []
+    for at in np.array_split(steps, -(-len(steps) // TOGETHER)):
+        M, left, _, (_, first, last) = _left(system, run, at, inputs)
+        off.append(np.einsum("mij,mj->mi", M, left[Acts.AT]))
+        pushed.append(np.einsum("mij,mj->mi", M, 0.5 * (first + last)))
+    lost, most = (np.max(np.abs(np.cumsum(np.concatenate(one), axis=0)), axis=0) for one in (off, pushed))
+    sizes = of_like(most, case.velocities)
+    return float(np.max(np.divide(lost, sizes, out=np.zeros(len(lost)), where=sizes > 0.0)))
 
 
 def _told(run: Trajectory, case: Case) -> System | None:

@@ -16,7 +16,7 @@ import numpy as np
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.alignment import aligned
-from crossbody.reports.measuring.friction import Rubbing, rubbing
+from crossbody.reports.measuring.friction import Rubbing, rubbing, whole
 from crossbody.reports.measuring.impulse import (
     Signal,
     away,
@@ -53,10 +53,10 @@ def lam_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return math.nan
     mine, theirs = _totals(truth, run, case, last)
     truth.used(t := float(run.t[last]))
-    scale = float(np.max(np.abs(theirs), initial=0.0))
+    scale = float(np.max(whole(theirs[None], case), initial=0.0))
     least = idle(truth.trajectory) * case.t_end
     named = of_rows(case, "N s", "N m s")
-    return largest(np.abs(mine - theirs)[None], np.array([t]), named, max(scale, least)) if scale else None
+    return largest(whole((mine - theirs)[None], case), np.array([t]), named, max(scale, least)) if scale else None
 
 
 def _totals(truth: Truth, run: Trajectory, case: Case, last: int) -> tuple[Floats, Floats]:
@@ -64,14 +64,14 @@ def _totals(truth: Truth, run: Trajectory, case: Case, last: int) -> tuple[Float
 
     Over the same samples by the same rule as far as they are beside each other, and by the truth's own from there on.
     """
-    whole, end = truth.trajectory, run.t[[last]]
-    if counts_itself(run, whole):
-        return impulse_upto(run, end[0]), collided(end, integrated(whole, multipliers, end), whole.events)[0]
+    own, end = truth.trajectory, run.t[[last]]
+    if counts_itself(run, own):
+        return impulse_upto(run, end[0]), collided(end, integrated(own, multipliers, end), own.events)[0]
     inside, exact = aligned(truth, run, case)
     run, exact = before_stops(run, exact)
     upto = min(int(np.count_nonzero(inside)) - 1, last)
-    rest = impulse_upto(whole, end[0]) - impulse_upto(whole, exact.t[upto])
-    return impulse_upto(run, end[0]), true_impulse(run, exact, whole)[upto] + rest
+    rest = impulse_upto(own, end[0]) - impulse_upto(own, exact.t[upto])
+    return impulse_upto(run, end[0]), true_impulse(run, exact, own)[upto] + rest
 
 
 def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -93,10 +93,10 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
     if not own:
         run, exact = before_stops(run, exact)
     theirs = true_impulse(run, exact, truth.trajectory)
-    scale = float(np.max(np.abs(theirs), initial=0.0))
+    scale = float(np.max(whole(theirs, case), initial=0.0))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
-    off = np.abs(with_collisions(run, run.events)[inside] - theirs)[smooth]
+    off = whole(with_collisions(run, run.events)[inside] - theirs, case)[smooth]
     scale = max(scale, idle(truth.trajectory) * case.t_end) if scale else 0.0
     found = largest(off, run.t[inside][smooth], of_rows(case, "N s", "N m s"), scale or 1.0)
     return found if scale else found or None
@@ -104,12 +104,17 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
 
 def friction_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
     """Impulse of friction of every pair of shapes since the start, against the truth's."""
+    if (found := rubbing(run, case)) is None:
+        return None
 
     def pushes(motion: Trajectory) -> tuple[Floats, None]:
-        found = _rubbing(motion, case)
-        return found.of_pairs(found.force).reshape(len(motion.t), -1), None
+        return _rubbing(motion, case).force.reshape(len(motion.t), -1), None
 
-    return None if rubbing(run, case) is None else _apart(truth, run, case, pushes, "N s")
+    def of_pairs(impulses: Floats) -> Floats:
+        lengths: Floats = np.linalg.norm(found.of_pairs(impulses.reshape(len(impulses), len(found.rows), -1)), axis=-1)
+        return lengths
+
+    return _apart(truth, run, case, pushes, "N s", of_pairs)
 
 
 def friction_work(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -123,7 +128,7 @@ def friction_work(truth: Truth, run: Trajectory, case: Case) -> float | None:
         return places.force.reshape(len(motion.t), -1), places.slip.reshape(len(motion.t), -1)
 
     def of_pairs(works: Floats) -> Floats:
-        return found.of_pairs(works.reshape(len(works), len(found.rows), -1).sum(axis=-1))
+        return np.abs(found.of_pairs(works.reshape(len(works), len(found.rows), -1).sum(axis=-1)))
 
     return _apart(truth, run, case, works, "J", of_pairs)
 
@@ -135,12 +140,12 @@ def _rubbing(motion: Trajectory, case: Case) -> Rubbing:
 
 
 def _apart(
-    truth: Truth, run: Trajectory, case: Case, signal: Signal, unit: str, of: Callable[[Floats], Floats] = np.asarray
+    truth: Truth, run: Trajectory, case: Case, signal: Signal, unit: str, of: Callable[[Floats], Floats]
 ) -> Placed | None:
-    """Return the largest difference of what integrals of a signal come to."""
+    """Return the largest size `of` differences of integrals of a signal."""
     inside, exact = aligned(truth, run, case, releases=not counts_itself(run, truth.trajectory))
     if not inside.any():
         return None
     mine, theirs = cumulated(run, *signal(run))[inside], beside(run, exact, truth.trajectory, signal)
-    off = np.abs(of(mine - theirs)).max(axis=1, initial=0.0)
+    off = of(mine - theirs).max(axis=1, initial=0.0)
     return largest(off, run.t[inside], [("", unit)])

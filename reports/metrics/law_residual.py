@@ -22,7 +22,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.cases.contacts import CLOSED
 from crossbody.reference import System
 from crossbody.reports.measuring.equations import equations, finite, spread
-from crossbody.reports.measuring.friction import directed, off_bound, rubbing
+from crossbody.reports.measuring.friction import directed, off_bound, rubbing, whole
 from crossbody.reports.measuring.impulse import told
 from crossbody.reports.measuring.scale import idle
 from crossbody.reports.measuring.truth import Truth
@@ -159,6 +159,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
             scale = max(scale, float(np.max(np.asarray(system.friction)[sliding & system.dry], initial=0.0)))
             continue
         lam, moving = multipliers(system, case, run, at, rows, np.flatnonzero(sliding), fast, inputs)
-        worst = max(worst, float(np.max(np.abs(_times(moving, run.lam[np.ix_(at, rows)] - lam)))))
-        scale = max(scale, float(np.max(np.abs(_times(moving, lam)))))
+        sizes = np.zeros((2, len(at), run.lam.shape[1]))
+        sizes[..., rows] = _times(moving, run.lam[np.ix_(at, rows)] - lam), _times(moving, lam)
+        off, most = (float(np.max(whole(one, case))) for one in sizes)
+        worst, scale = max(worst, off), max(scale, most)
     return worst / max(scale, idle(truth.trajectory)) if scale else None

@@ -12,9 +12,11 @@ import pytest
 
 from crossbody import cases, engines
 from crossbody.cases import Acts, Case
-from crossbody.reports.judging.acting import misacting
+from crossbody.reports.judging.acting import SUMS, misacting, uncertain
 from crossbody.reports.judging.run_verdicts import Entry, verdicts
 from crossbody.reports.judging.truth import truth_of
+from crossbody.reports.measuring.impulse import cumulative
+from crossbody.reports.measuring.momenta import unseen
 
 RUNS = (
     ("bouncing_ball:linear", "mujoco:default"), ("bouncing_ball:linear", "mujoco:matched"),
@@ -76,3 +78,23 @@ def test_it_is_a_row_of_a_run() -> None:
     rows = [row for row in verdicts(case, late, truth_of(case), "") if row.metric == "impulses (control)"]
     assert [(row.verdict, row.value > 1.0) for row in rows] == [("outside", True)]
     assert "over the steps that end at its samples" in rows[0].why
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sums_that_samples_do_not_tell_are_not_judged_and_say_how_far_they_are_off(seed: int, tmp_path: Path) -> None:
+    """Stages of Runge-Kutta's steps push where no sample does: a sum is off by what the momentum of the ball tells."""
+    draw, path = np.random.default_rng(seed), tmp_path / "ball.xml"
+    path.write_text(BALL.format("RK4", draw.uniform(2e-3, 5e-3), draw.uniform(0.12, 0.3)))
+    case = cases.from_file(path, t_end=0.8, friction=1)
+    entry = ran(case, "mujoco:as_is")
+    assert entry.run is not None
+    run = entry.run
+    gained = run.v[:, 2] - run.v[0, 2] + 9.81 * run.t
+    off = np.max(np.abs(cumulative(run)[:, 0] - gained)) / np.max(np.abs(gained))
+    assert unseen(run, case) == pytest.approx(off, rel=0.1)
+    rows = {row.metric: row for row in verdicts(case, entry, truth_of(case), "") if row.metric in SUMS}
+    assert {"lam_impulse", "lam_impulse_path"} <= set(rows)
+    assert {row.verdict for row in rows.values()} == {"not judged"}
+    assert all("trapezoids" in row.why for row in rows.values())
+    fine = replace(run, lam=0.0 * run.lam, acts=Acts.BEHIND)
+    assert uncertain(case, fine) == {}

@@ -435,3 +435,30 @@ def test_a_row_says_where_no_friction_can_be_turned(speed: float, turns: bool) -
     rows = [row for row in blind(case, from_run(run, Tier.A, "itself"), "") if row.metric == "friction_angle (control)"]
     assert [row.verdict for row in rows] == [Word.INFO] * (not turns)
     assert any("friction_angle" in fault.sees for fault in faults(case, run)) == turns
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_number_of_friction_asks_how_the_axes_of_a_floor_are_turned(seed: int) -> None:
+    """What two rows of a plane bear is one force: whichever way they point, its error is as large."""
+    draw = np.random.default_rng(seed)
+    v0 = [*draw.uniform(-2.0, 2.0, 2), 0.0, *draw.uniform(-5.0, 5.0, 3)]
+    angle = float(draw.uniform(-np.pi, np.pi))
+    found = []
+    for turn in (0.0, angle):
+        scene = sphere_on_floor(MU, RADIUS, turn=turn)
+        case = case_of(scene, q0=[0, 0, RADIUS, 1, 0, 0, 0], v0=v0, t_end=0.5)
+        own = engines.load("reference").prepare(case, "compiled", samples=np.linspace(0.0, 0.5, 101)).run()
+        rows = np.flatnonzero(~case.law.touches)
+        # a force along the floor that the run has besides, by axes that do not turn
+        more = np.random.default_rng(seed + 100).uniform(-1.0, 1.0, (len(own.t), 2))
+        turned_ = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        lam = own.lam.copy()
+        lam[:, rows] += more @ turned_.T
+        run = replace(own, lam=lam)
+        truth = from_run(own, Tier.A, "itself")
+        names = (*NAMES, "lam_impulse", "lam_impulse_path", "mode_contradicted", "complementarity")
+        found.append([measured(name, run, case, truth) for name in names])
+    assert (found[0][3] or 0.0) > 1e-3  # friction_impulse
+    for one, other in zip(*found, strict=True):
+        assert (one is None) == (other is None)
+        assert one is None or one == pytest.approx(other, rel=1e-8, abs=1e-9)
