@@ -12,9 +12,14 @@ from functools import cache
 
 import numpy as np
 
-from crossbody.reports.judging.asked import Found
+from crossbody.cases import Tier, Trajectory
+from crossbody.cases.files.case import case_of
+from crossbody.cases.scene import Body, Joint, Scene
+from crossbody.reports.judging.asked import Found, rows_of
 from crossbody.reports.judging.told import runs_of, sentence
+from crossbody.reports.judging.truth_row import start_below
 from crossbody.reports.judging.verdict import Row, Verdict, Word
+from crossbody.reports.measuring.truth import Truth
 
 DRAWS, SEED, LIMIT = 12, 31, 0.01
 METRICS = ("position", "velocity", "energy_drift", "balls_out", "gap_residual")
@@ -28,7 +33,9 @@ WORDS = (Word.EXPECTED, Word.OUTSIDE, Word.INFO)
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what is said, number, least and most, and of what, where another number is named than must be."""
-    return tuple(("verdict sentence", math.nan, (value, value), f"made-up rows: {what}") for value, what in _unnamed())
+    unnamed = (("verdict sentence", math.nan, (value, value), f"made-up rows: {what}") for value, what in _unnamed())
+    below = rows_of(_below, lambda why: ("start", math.nan, (0.0, 0.0), f"a start below surfaces, which ends in {why}"))
+    return (*unnamed, *below)
 
 
 def _unnamed() -> Iterator[tuple[float, str]]:
@@ -43,6 +50,41 @@ def _unnamed() -> Iterator[tuple[float, str]]:
             for row, place in zip(wanted, places, strict=True):
                 if place < 0 or places != sorted(places):
                     yield row["value"], f"{kind}, {_words(row)}"
+
+
+DEEP = {"knee high": (-0.594, "rad"), "rail low": (-0.0027, "m"), "tip low": (-0.031, "m")}
+"""How far a start is beyond bounds."""
+
+
+def _below() -> Iterator[Found]:
+    """Yield how far beyond its bounds a start is, in what unit, where another number is said, or another first."""
+    kinds = {"knee": "hinge", "rail": "slide", "tip": "slide", "free": "slide"}
+    case = case_of(
+        Scene(
+            bodies=tuple(Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)) for name in kinds),
+            joints=tuple(Joint(name=name, body=name, type=kind, range=(-1.0, 1.0)) for name, kind in kinds.items()),
+        ),
+        name="made_up", t_end=1.0,
+    )  # fmt: skip
+    gap = np.array([[next((deep for name, (deep, _) in DEEP.items() if name in row), 0.5) for row in case.contacts]])
+    none = np.zeros_like(gap)
+    motion = Trajectory(
+        t=np.zeros(1),
+        q=case.q0[None],
+        v=case.v0[None],
+        gap=gap,
+        lam=none,
+        energy=np.ones((1, 2)),
+        mode=none.astype(int),
+    )
+    said = start_below(case, Truth(tier=Tier.A, source="", trajectory=motion, at=lambda _: motion, agreement={}))
+    wanted = ", ".join(f"{name} by {-deep:.2g} {unit}" for name, (deep, unit) in sorted(DEEP.items(), key=_deepest))
+    if wanted not in said:
+        yield "start", math.nan, (0.594, 0.594), f"a start below surfaces: {said!r} lacks {wanted!r},"
+
+
+def _deepest(one: tuple[str, tuple[float, str]]) -> float:
+    return one[1][0]
 
 
 def _rows(draw: np.random.Generator, word: Word) -> list[Row]:

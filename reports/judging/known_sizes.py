@@ -7,6 +7,7 @@ the turns of a wheel, or a body's to how far off another one is, no number of th
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,7 @@ from crossbody.cases import Case, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.reports.judging.asked import Asked, Found, unlike_by
-from crossbody.reports.measuring.scale import scale_of, scale_of_rates
+from crossbody.reports.measuring.scale import energy, idle, rounded, scale_of, scale_of_rates, still
 
 PART, LASTS = 1e-12, 2.0
 """Part by which a size may differ; of a motion, s."""
@@ -34,7 +35,7 @@ SLOWER = {"finger": 0.2, "idle": 0.2, "rail": 0.05, "stop": 0.05}
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which coordinate is measured by another size than it must be, m or rad, or their rates."""
-    return unlike_by((_beside_a_wheel, _alone), "size", "coordinates of a scene, which end in", PART, 1e-300)
+    return unlike_by((_beside_a_wheel, _alone, _carried), "size", "coordinates of a scene, which end in", PART, 1e-300)
 
 
 def _beside_a_wheel() -> Iterator[Asked]:
@@ -52,6 +53,35 @@ def _alone() -> Iterator[Asked]:
     truth = _motion(case, MOVES)
     yield from _asked(case, truth, SLOWER)
     yield from _rates(case, truth, {name: size / LASTS for name, size in SLOWER.items()})
+
+
+KINETIC, SWING, FAR, FALLS = 3.0, 40.0, 250.0, 7.0
+"""Of a motion: its largest kinetic energy, and by how much its potential differs, J; where it begins, and how far it
+goes, m."""
+IDLE, ROUNDING = 1e-3, 1e-6
+"""Of the force that moves it, and of where it is, of which nothing is told."""
+
+
+def _carried() -> Iterator[Asked]:
+    """Yield what energies, idle rows and gaps of a fall are measured by, and whether it stands still."""
+    part, none = np.linspace(0.0, 1.0, 5), np.zeros((5, 0))
+    q, energies = (FAR - FALLS * part)[:, None], np.stack([KINETIC * part, 10.0 * SWING - SWING * part], axis=1)
+    fall = Trajectory(
+        t=LASTS * part, q=q, v=np.full((5, 1), -FALLS / LASTS), gap=none, lam=none, energy=energies,
+        mode=none.astype(int),
+    )  # fmt: skip
+    rest = replace(fall, q=np.full((5, 1), FAR), v=np.zeros((5, 1)))
+    yield "size", "the energy of a fall", energy(fall), SWING
+    yield "size", "the energy of a fast fall", energy(replace(fall, energy=energies * [100.0, 1.0])), 100.0 * KINETIC
+    yield "size", "what is idle in a fall", idle(fall), IDLE * SWING / FALLS
+    yield "size", "rounding of gaps in a fall", rounded(q), ROUNDING * FAR
+    yield "size", "rounding of gaps near an origin", rounded(q / (2.0 * FAR)), ROUNDING
+    for what, run, wanted in (
+        ("fall", fall, 0.0),
+        ("body at rest", rest, 1.0),
+        ("start", replace(rest, v=fall.v), 0.0),
+    ):
+        yield "still", f"a {what}", float(still(run)), wanted
 
 
 def _case(names: tuple[str, ...]) -> Case:

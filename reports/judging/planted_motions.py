@@ -76,8 +76,11 @@ def velocities(plain: Plain) -> Iterator[Control]:
     leads = np.where(turns, 1.0 / case.t_end, np.delete(leads, [at + 3 for at in case.quaternions]))
     rests = largest <= RESTS
     sizes, least = np.where(rests, np.maximum(largest, leads), largest), np.where(rests & ~turns, largest, np.inf)
+    if case.scene is not None:  # what turns little beside a wheel, or stands beside what flies, is measured by less
+        own = np.max(np.abs(run.v), axis=0)
+        least = np.minimum(least, np.where(own > TENTH * sizes, own, 0.0))
     for j in plain.some(range(run.v.shape[1])):
-        most = float(sizes[j] / min(least[j], sizes[j]))
+        most = float(sizes[j] / min(least[j], sizes[j])) if least[j] > 0.0 else np.inf
         for i, sign in plain.both():
             yield Control(
                 fault=f"the velocity of {case.velocities[j].name} {sign * PART:g} of the largest off at one sample",

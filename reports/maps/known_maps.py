@@ -11,13 +11,16 @@ import math
 import re
 from collections.abc import Iterator
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from crossbody import cases
+from crossbody.cases import Mode
 from crossbody.reports.judging.asked import Found, Within, unlike
-from crossbody.reports.maps.gapmap import COLUMNS, LARGEST_S, gap_map, in_words, summary
+from crossbody.reports.maps.gapmap import COLUMNS, LARGEST_S, gap_map, in_words, over, summary
 from crossbody.reports.runs.choice import Pick
 
 POINTS = 21
@@ -28,7 +31,7 @@ CLOSE, MADE = 1e-6, 0.02
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of what, where it is another one."""
-    return unlike((_runs, _summaries), "gap map", "sliders, which end in")
+    return unlike((_runs, _ends, _summaries), "gap map", "sliders, which end in")
 
 
 def _runs() -> Iterator[Within]:
@@ -48,6 +51,23 @@ def _runs() -> Iterator[Within]:
     for name, wanted in (("energy_created", 0.0), ("to_sequential", 2.0 / 3.0), ("to_simultaneous", 0.0)):
         yield name, "3 balls that touch", float(first[name]), wanted, CLOSE
     yield "energy_created", "3 balls", float(three["energy_created"].max()), 1.0 / 6.0, MADE
+
+
+def _ends() -> Iterator[Within]:
+    """Yield 1 where a row of balls that goes on to collide, or still does, is said to have ended, or another is not."""
+    free, press = int(Mode.FREE), int(Mode.CONTACT)
+    for what, last, mode, wanted in (
+        ("that part", (-1.0, 0.5, 2.0), (free, free), True),
+        ("of which two close", (-1.0, 2.0, 0.5), (free, free), False),
+        ("that go on as one", (1.0, 1.0, 1.0), (free, free), True),
+        ("that still push", (-1.0, 0.5, 2.0), (free, press), False),
+    ):  # fmt: skip
+        run: Any = SimpleNamespace(
+            q=np.array([[0.0, 1.0, 2.0], [3.0, 2.0, 1.0]]),
+            v=np.array([[3.0, 0.0, 0.0], last]),
+            mode=np.array([mode] * 2),
+        )
+        yield "end", f"balls {what}", float(over(run) != wanted), 0.0, 0.0
 
 
 def _summaries() -> Iterator[Within]:

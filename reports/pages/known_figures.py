@@ -308,6 +308,20 @@ def _rotations() -> Iterator[Said]:
     yield "the largest error in words", ("by 0.2 rad" in both, "by 0.1 rad" in both), (True, False)
 
 
+def _still() -> Iterator[Said]:
+    """Yield which coordinates go nowhere, whatever their rates: by how far off the start, in the size of each."""
+    t, none = np.linspace(0.0, 1.0, 5), np.zeros((5, 0))
+    q = np.stack([3.0 + 0.5 * t, np.full(5, 2.0), 1.0 + 1e-5 * t], axis=1)
+    run = Trajectory(t=t, q=q, v=np.ones((5, 3)), gap=none, lam=none, energy=np.ones((5, 2)), mode=none.astype(int))
+    about = drawn().about | {"coordinates": [{"name": name, "unit": "m"} for name in "abc"], "turning": (),
+                             "quaternions": (), "scales": [4.0, 2.0, 1.0]}  # fmt: skip
+    one = Trace(about=about, run=run, truth=None)
+    for most, wanted in ((1e-3, [1, 2]), (1e-6, [1])):
+        yield f"coordinates at rest at {most:g}", figures.still([one], {"position": {most: "e"}}), wanted
+    rest = replace(one, run=replace(run, q=np.full((5, 3), 2.0)))
+    yield "coordinates of a motion at rest", len(figures.still([rest], {"position": {1e-3: "e"}})), 0.0
+
+
 def _sparse() -> Iterator[Said]:
     """Yield that a line of errors is broken where a step is long, and that its ends are dots."""
     t = np.concatenate([np.linspace(0.0, 0.3, 31), np.linspace(0.6, 0.9, 31), [1.0]])
@@ -327,5 +341,5 @@ KINDS = {
     "rotations": _rotations, "long steps": _sparse, "motion figure": _motion,
     "force figure": _force, "energy figure": _energy, "penetration figure": _penetration,
     "step figure": _steps, "mode figure": _modes, "thinned lines": _thinned, "limit lines": _limits,
-    "off scale": _named,
+    "off scale": _named, "what stands still": _still,
 }  # fmt: skip

@@ -20,9 +20,10 @@ from crossbody import hw
 from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.covariance import Layout, scatter
 from crossbody.hw.fitting.doubts import agreement
-from crossbody.hw.windows.whiteness import autocorrelation, crosscorrelation, stride_of
+from crossbody.hw.windows.whiteness import Correlation, autocorrelation, crosscorrelation, stride_of
 from crossbody.hw.windows.window import recorded_inputs
 from crossbody.reports.judging.asked import Found, Within, unlike
+from crossbody.reports.replay import comparison
 from crossbody.reports.replay import known_replay as known
 from crossbody.reports.replay.known_fits import flight
 
@@ -48,7 +49,7 @@ delay = 0.02
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of what, where it is another one."""
-    kinds = (_halves, _correlated, _channels, _unseen, _held, _residuals, _delayed, _turns)
+    kinds = (_halves, _correlated, _channels, _unseen, _held, _residuals, _tables, _delayed, _turns)
     return unlike(kinds, "doubt", "data that end in")
 
 
@@ -155,6 +156,31 @@ def _residuals() -> Iterator[Within]:
         yield "inside", f"a residual that is {what}", inside, most, 1.0 - BAND
     wave = np.sin(2.0 * math.pi * np.arange(20 * PERIOD) / PERIOD)
     yield "samples of a mean", "a wave", float(stride_of(wave, 0.0)), PERIOD / 12.0, 1.0
+
+
+def _tables() -> Iterator[Within]:
+    """Yield how much is inside a band on both of its sides, and rows of what pages show of residuals."""
+    lags = Correlation(lags=np.arange(4), values=np.array([1.0, -0.9, 0.01, 0.5]), band=0.1)
+    yield "inside", "a residual that changes its sign", lags.inside, 1.0 / 3.0, EXACT
+    replayed = hw.replay(_log(), "ball", restart=0.0)
+    (one,) = replayed.predictions[:1]
+    told, some, shown = "a replay of a ball", 7, comparison.residuals(replayed, points=7)
+    yield "rows of residuals", told, float(len(shown)), float(some * len(replayed.predictions)), 0.0
+    at = np.linspace(0, len(replayed.time) - 1, some).astype(int)
+    left = replayed.measured[:, 0] - np.concatenate([y[:, 0] for y in one.y])
+    for name, wanted in (("t", replayed.time), ("measured", replayed.measured[:, 0]), ("value", left)):
+        if name in shown:
+            off = float(np.max(np.abs(shown[name].to_numpy()[:some] - wanted[at])))
+            yield f"{name} of residuals", told, off, 0.0, EXACT
+    means = replace(lags, stride=5)
+    made: Any = SimpleNamespace(
+        predictions=(SimpleNamespace(engine="e", profile="p", failed=0),), coordinates=(SimpleNamespace(name="h"),),
+        tells=lambda _: True, autocorrelation=lambda *_: means, windows=(SimpleNamespace(u=np.zeros((1, 0))),),
+        log=SimpleNamespace(sample_time=known.STEP),
+    )  # fmt: skip
+    rows = comparison.correlations(made)
+    for name, column in (("lag_s", 5.0 * known.STEP * lags.lags), ("value", lags.values), ("lag", lags.lags)):
+        yield f"{name} of correlations", told, float(np.max(np.abs(rows[name] - column))), 0.0, EXACT
 
 
 def _delayed() -> Iterator[Within]:

@@ -363,6 +363,10 @@ def _needed() -> Iterator[Within]:
     off = np.abs(found.value[:, 0] - _torque(t))[quiet]
     told = "the link of known torques"
     yield "torque that is needed", told, float(np.max(off)), 0.0, 1e-3 * max(map(abs, TORQUES))
+    noisy = hw.inverse(link_log(0.0, NOISE), "single_pendulum", parameters=GIVEN, half=6, degree=4)
+    spread = float(np.sqrt(np.mean((noisy.value[quiet, 0] - _torque(t)[quiet]) ** 2)))
+    mean = float(np.sqrt(np.mean(noisy.std[quiet, 0] ** 2)))
+    yield "deviation of torques", "a link of known noise", mean, spread, 2.0 * ALIKE * spread
     yield "instants of torques", told, float(t[0]), 6.0 * STEP, EXACT
 
 
