@@ -37,7 +37,7 @@ def factor(s: Any, m: Model, w: Work, turning: bool) -> int:
     couple(s, m, w)
     for j in range(s.na):
         i = w.idx[j]
-        w.listed[i] = j
+        w.listed[i], w.carried[j] = j, 0.0
         if m.drift[i] != 0.0:
             w.hda[j] -= m.drift[i]
             w.r[j] += w.law[i, 1] * m.drift[i]

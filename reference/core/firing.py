@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core import events, guards, journal, settle
-from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, scatter
+from crossbody.reference.core.acceleration import GENERAL, accelerate, activate, is_active, scatter
 from crossbody.reference.core.friction import (
     BEGIN_SLIP,
     DETERMINANT,
@@ -127,13 +127,29 @@ def _stops_in_a_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 @compiled
 def all_jam(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> bool:
-    """Whether contacts that let go in turn would jam, or nearly, if all pressed that close; it marks these."""
+    """Whether contacts that let go in turn would jam, or nearly, if all pressed that close, or all but one of them.
+
+    It marks these. Without a row that lets go others may jam that go on beside it.
+    """
     for i in range(s.nc):
         closes = has_friction(m, i) and b.mode[i] == BALLISTIC and w.gap[i] <= 0.0 and w.rate[i] < 0.0
         if closes and not is_dry(m, i):
             b.mode[i] = active_mode(s, m, w, i)
     activate(s, m, w, b.mode)
-    return bool(jams(K, s, m, w, b))
+    if jams(K, s, m, w, b):
+        return True
+    marks = b.history[len(b.history) - 1]
+    for i in range(s.nc):
+        if marks[i] and m.unilateral[i] and not is_dry(m, i) and is_active(b.mode[i]):
+            before = b.mode[i]
+            b.mode[i] = BALLISTIC
+            activate(s, m, w, b.mode)
+            jam = jams(K, s, m, w, b)
+            b.mode[i] = before
+            activate(s, m, w, b.mode)
+            if jam:
+                return True
+    return False
 
 
 @compiled

@@ -25,7 +25,15 @@ from crossbody.reference.core.layout import (
     Model,
     Work,
 )
-from crossbody.reference.core.machine import change_of_acceleration, evaluate, next_mode, noise, released_mode, touching
+from crossbody.reference.core.machine import (
+    active_mode,
+    change_of_acceleration,
+    evaluate,
+    next_mode,
+    noise,
+    released_mode,
+    touching,
+)
 from crossbody.reference.kernels import LOST as IS_LOST
 from crossbody.reference.kernels import TOUCHED, UNCHANGED
 
@@ -163,6 +171,32 @@ def _bars(s: Any, m: Model, w: Work, b: Buffers) -> bool:
 
 
 @compiled
+def _decide_together(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
+    """Decide once on all rows that take turns, whether they press or not; 0, a code, or MODE_CYCLE if they go on.
+
+    Of rows that press and let go in turn each one decision has seen a part: one on all knows what is consistent.
+    """
+    if not s.frictional or s.fsm != LEVEL:
+        return int(MODE_CYCLE)
+    for i in range(s.nc):
+        if b.history[len(b.history) - 1, i] and is_decided(w, i) and not is_active(b.mode[i]):
+            change(s, b, i, active_mode(s, m, w, i))
+    code = evaluate(K, s, m, w, b.mode)
+    if code == 0:
+        code = _decide_friction(s, m, w, b)
+    if code == 0:
+        code = evaluate(K, s, m, w, b.mode)
+    if code != 0:
+        return int(code)
+    _consistent(K, s, m, w)
+    _want(K, s, m, w, b)
+    for i in range(s.nc):
+        if w.struck[i] != b.mode[i]:
+            return int(MODE_CYCLE)
+    return 0
+
+
+@compiled
 def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
     """Collide and switch until the mode set is consistent; 0 or a code."""
     changed = b.history[len(b.history) - 1]
@@ -204,7 +238,7 @@ def _iterate(K: Any, s: Any, m: Model, w: Work, b: Buffers) -> int:
                 continue
             if s.one_by_one:  # the set that stands again is the one of rows that depend on each other, or a cycle
                 code = evaluate(K, s, m, w, b.mode) if s.one_by_one == ALONE else 0
-                return int(code) if code != 0 else MODE_CYCLE
+                return int(code) if code != 0 else _decide_together(K, s, m, w, b)
             s.one_by_one, s.history = 1, 0
             changed[:] = 0
 

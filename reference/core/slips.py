@@ -81,12 +81,14 @@ def _note_gains(s: Any, m: Model, w: Work) -> None:
 
     It counts for all rows of the same trees. An open row of trees without contact keeps what it had in the last one.
     """
+    for j in range(s.na):
+        w.trial[j] = _gain(m, w, j)
     for k in range(s.nc):
         most = -1.0
         for j in range(s.na):
             i = w.idx[j]
-            if m.trees[k, 0] < m.trees[i, 1] and m.trees[i, 0] < m.trees[k, 1]:
-                most = max(most, _gain(m, w, j))
+            if w.trial[j] > most and m.trees[k, 0] < m.trees[i, 1] and m.trees[i, 0] < m.trees[k, 1]:
+                most = w.trial[j]
         if most >= 0.0:
             w.gained[k] = most
 

@@ -67,8 +67,9 @@ def sensitivity(
     Collisions that follow one another at one instant, as through balls that touch, are passed one by one: the
     derivative is then that of deviations that part the balls, as long as those do not meet again.
 
-    Contacts that are closed at the start stay so in deviations; those that slide from it without a slip have no
-    derivative by what gives them one, which is NaN while the others hold. A slip that stops takes the deviations
+    Contacts that are closed at the start and deeper than the tolerance tells stay so in deviations. Those that only
+    touch have no derivative by what lifts them off, and those that slide from the start without a slip none by what
+    gives them one: it is NaN while the others hold. A slip that stops takes the deviations
     of its velocity with it. Where a contact sticks from the start or from its touch, so do those by which it would
     slip: they die out within times of their own size.
 

@@ -16,7 +16,7 @@ from crossbody.reference._system import initial_modes
 from crossbody.reference.kinds import Floats
 from crossbody.reference.linear._bends import sided, smooth_switches, watched_gradient, with_sides
 from crossbody.reference.linear._point import NO_ROWS, Point, dense, gaps, terms
-from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, NOISE, STILL, Slipping
+from crossbody.reference.linear._slipping import ACTIVE, ALIKE, EDGE, GRAZED, NOISE, NONE, STILL, Slipping
 from crossbody.reference.linear._slipping import AS_ONE as SWITCH_AS_ONE
 from crossbody.reference.linear._variation import (
     Theta,
@@ -137,6 +137,27 @@ class Walk:
                 "derivatives are one-sided at most (NaN); the others hold."
             )
 
+    def _part(self, here: Point) -> None:
+        """Let variables go that lift what touches at the start no deeper than its gap is known: there it would fall."""
+        n = self.at.system.n
+        gap, found = gaps(here, here.q, here.v), list[int]()
+        own = (np.asarray(self.at.system.unilateral) != 0) & (np.asarray(self.at.system.follows) < 0)
+        for i in here.active[own[here.active] & (np.abs(gap[here.active]) <= self.known)].tolist():
+            for rate in (False, True):
+                gradient = gap_gradient(here, self.over, i, rate=rate)
+                change = gradient[: 2 * n] @ self.S
+                change[2 * n :] += gradient[2 * n :]
+                self.lost |= np.abs(change) > NONE * np.abs(gradient).max()
+            found.append(i)
+        if found:
+            self.S[:, self.lost] = 0.0
+            what = (
+                f"{'Row' if len(found) == 1 else 'Rows'} {', '.join(map(str, found))} only "
+                f"touch{'es' if len(found) == 1 else ''} at the start, t = 0 s: by what lifts it off, derivatives are "
+                "one-sided at most (NaN); the others hold."
+            )
+            self.message = f"{self.message} {what}".strip()
+
     def _bend(self, group: list[Switch], *, alone: bool) -> bool:
         """Pass kinks of one instant, at which a force may jump; False if that is only grazed."""
         if not group:
@@ -167,6 +188,7 @@ class Walk:
         if start > 0.0 or not end > start:
             return True
         here = self._here(0.0)
+        self._part(here)
         for i in self._open():
             if self._grazes(here, i):
                 self.message = f"The gap of row {i} is only grazed at the start, t = 0 s."

@@ -111,9 +111,12 @@ def test_a_cycle_of_stick_and_slip_keeps_its_phase_alone():
     found = sensitivity(made, q, v, 2.0 * period, parameters=["mu[0]"])
     assert kinds(found) == 2 * [("SLIP", "STICK"), ("STICK", "SLIP")]
     np.testing.assert_allclose(found.state, [*q, *v], atol=1e-9)
-    np.testing.assert_allclose(np.abs(found.multipliers), [1.0, 0.0, 0.0, 0.0], atol=1e-6)
+    along = [0, 2]  # what would lift it off has no derivative
+    assert np.isnan(found.by_start).all(axis=0).tolist() == [False, True, False, True]
+    values = np.sort(np.abs(np.linalg.eigvals(found.by_start[np.ix_(along, along)])))
+    np.testing.assert_allclose(values, [0.0, 1.0], atol=1e-6)
     flow = np.array([*v, -100.0 * q[0] + v[0] + 0.3 * G, 0.0])
-    np.testing.assert_allclose(found.by_start @ flow, flow, atol=1e-7 * np.abs(flow).max())
+    np.testing.assert_allclose(found.by_start[:, along] @ flow[along], flow, atol=1e-7 * np.abs(flow).max())
 
 
 def ends(made, q, v, t_end, rtol=1e-12):
@@ -128,7 +131,8 @@ def compared(made, q, v, t_end, *, ways=3, step=1e-5, seed=0, close=1e-6, rtol=1
     contacts = [i for i in np.flatnonzero(made.tangents) if not made.dry[i]]
     names = [f"mu[{i}]" for i in contacts]
     found = sensitivity(made, q, v, t_end, parameters=names, rtol=rtol)
-    if found.outcome is not Outcome.FINISHED:
+    known = np.isfinite(found.by_start).all(axis=0)
+    if found.outcome is not Outcome.FINISHED and "only touch" not in found.message:
         return found
     N = np.stack([made.displacement(found.state[: made.nq], e) for e in np.eye(n)], axis=-1)
     here = np.stack([made.displacement(np.asarray(q, dtype=float), e) for e in np.eye(n)], axis=-1)
@@ -140,9 +144,9 @@ def compared(made, q, v, t_end, *, ways=3, step=1e-5, seed=0, close=1e-6, rtol=1
         return np.concatenate([np.linalg.lstsq(N, rate[0], rcond=None)[0], rate[1]])
 
     for _ in range(ways):
-        d = rng.normal(size=2 * n)
+        d = rng.normal(size=2 * n) * known
         expected = tangent(lambda s, d=d: ends(made, q + here @ d[:n] * s, v + d[n:] * s, t_end, runs))
-        assert np.abs(found.by_start @ d - expected).max() < close * max(np.abs(expected).max(), 1.0)
+        assert np.abs(found.by_start[:, known] @ d[known] - expected).max() < close * max(np.abs(expected).max(), 1.0)
     if names:
         expected = tangent(
             lambda s: ends(replace(made, mu=np.where(np.isfinite(made.mu), made.mu + s, made.mu)), q, v, t_end, runs)
@@ -193,7 +197,8 @@ def test_a_ball_that_is_struck(seed):
     """Its slip grows from nothing; where it turns slowly enough one arc ends at the very slip where the next begins."""
     scene, q, v = struck(seed)
     made = system(scene, case_of(scene).law)
-    assert compared(made, q, v, 0.012, ways=0, step=2e-5, runs=1e-13).outcome is Outcome.FINISHED
+    found = compared(made, q, v, 0.012, ways=0, step=2e-5, runs=1e-13)
+    assert found.outcome is Outcome.FINISHED or "only touch" in found.message
 
 
 def test_derivatives_that_take_too_long_say_how_far_they_came():
