@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats, distinct
-from crossbody.cases.splines import integral, spline
+from crossbody.cases.splines import integral, through
 from crossbody.cases.trajectory import Trajectory
 
 CROSSINGS = 3
 PARTS = 16  # points looked at from each sample to the next
+KEPT = 10_000  # samples of a piece whose cubics are kept, at most
 
 
 def pieces(starts: Floats, t: Floats) -> NDArray[np.intp]:
@@ -46,6 +47,12 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
     columns = np.concatenate([run.q, run.v, run.gap, run.lam, run.energy], axis=1)
     parts, smooth = _smooth(run)
     starts = np.array([run.t[a] for a, _ in parts])
+    known: dict[int, Callable[[Floats], Floats]] = {}
+
+    def piece(i: int) -> Callable[[Floats], Floats]:
+        some = _upto(run, *parts[i])
+        found = known.get(i) or _piece(run.t[some], columns[some], smooth)
+        return known.setdefault(i, found) if some.stop - some.start <= KEPT else found
 
     def at(times: Floats) -> Trajectory:
         times = np.asarray(times, dtype=np.float64)
@@ -54,8 +61,7 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
         which = np.clip(np.where(again, right, left), 0, None)
         out = np.empty((len(times), columns.shape[1]))
         for i in distinct(which):
-            some = _upto(run, *parts[i])
-            out[which == i] = _piece(run.t[some], columns[some], times[which == i], smooth)
+            out[which == i] = piece(int(i))(times[which == i])
         q, v, gap, lam, energy = np.split(out, np.cumsum(width)[:-1], axis=1)
         modes = np.array([run.mode[parts[i][0]] for i in which], dtype=np.int8).reshape(len(times), -1)
         return replace(run, t=times, q=q, v=v, gap=gap, lam=lam, energy=energy, mode=modes, ledger=None)
@@ -117,13 +123,21 @@ def _integral(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     return np.stack([np.interp(times, t, np.append(0.0, column)) for column in sums.T], axis=1)
 
 
-def _piece(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
+def _piece(t: Floats, values: Floats, smooth: bool) -> Callable[[Floats], Floats]:
+    """Return what gives values (m, k) of a piece at times (m,), by splines of what is finite or by straight lines."""
     keep = np.concatenate([[True], np.diff(t) > 0.0])
     t, values = t[keep], values[keep]
-    if len(t) == 1:
-        return np.repeat(values, len(times), axis=0)
-    out = np.stack([np.interp(times, t, column) for column in values.T], axis=1)
-    finite = np.isfinite(values).all(axis=0)
-    if smooth and len(t) > 2 and finite.any():
-        out[:, finite] = spline(t, values[:, finite], np.clip(times, t[0], t[-1]))
-    return out
+    finite = np.isfinite(values).all(axis=0) & (smooth and len(t) > 2)
+    curve = through(t, values[:, finite]) if finite.any() else None
+
+    def at(times: Floats) -> Floats:
+        if len(t) == 1:
+            return np.repeat(values, len(times), axis=0)
+        out = np.empty((len(times), values.shape[1]))
+        for k in np.flatnonzero(~finite):
+            out[:, k] = np.interp(times, t, values[:, k])
+        if curve is not None:
+            out[:, finite] = curve(np.clip(times, t[0], t[-1]))
+        return out
+
+    return at

@@ -5,6 +5,8 @@ de Boor, A Practical Guide to Splines (1978), chapter IV: the slopes at the samp
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,16 +24,26 @@ def spline(t: Floats, values: Floats, times: Floats) -> Floats:
         values: at them (n, k).
         times: (m,); beyond the ends the first or last cubic goes on.
     """
-    i, h, slopes, rest, bend = _cubics(t, values, times)
-    s = (times - t[i])[:, None]
-    x = s / h[i]
-    found: Floats = values[i] + s * (slopes[i] + x * (rest[i] + x * bend[i]))
-    return found
+    return through(t, values)(times)
+
+
+def through(t: Floats, values: Floats) -> Callable[[Floats], Floats]:
+    """Return the same spline as a function of times, whose cubics are found once."""
+    h, slopes, rest, bend = _cubics(t, values)
+
+    def at(times: Floats) -> Floats:
+        i = _step(t, times)
+        s = (times - t[i])[:, None]
+        x = s / h[i]
+        found: Floats = values[i] + s * (slopes[i] + x * (rest[i] + x * bend[i]))
+        return found
+
+    return at
 
 
 def integral(t: Floats, values: Floats, times: Floats) -> Floats:
     """Return the integral of the same spline from the first sample to other times (m, k)."""
-    i, h, slopes, rest, bend = _cubics(t, values, times)
+    i, (h, slopes, rest, bend) = _step(t, times), _cubics(t, values)
 
     def upto(s: Floats, of: NDArray[np.intp] | slice) -> Floats:
         x = s / h[of]
@@ -42,14 +54,18 @@ def integral(t: Floats, values: Floats, times: Floats) -> Floats:
     return whole[i] + upto((times - t[i])[:, None], i)
 
 
-def _cubics(t: Floats, values: Floats, times: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats]:
-    """Return in which step times are (m,), and of each step length, slope, and coefficients of its square and cube."""
-    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+def _step(t: Floats, times: Floats) -> NDArray[np.intp]:
+    """Return in which step times are (m,)."""
+    return np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+
+
+def _cubics(t: Floats, values: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return of each step length, slope, and coefficients of its square and cube."""
     h = np.diff(t)[:, None]
     chord = np.diff(values, axis=0) / h
     slopes = _slopes(t, values) if len(t) > 2 else np.repeat(chord, 2, axis=0)
     bend = slopes[:-1] + slopes[1:] - 2.0 * chord
-    return i, h, slopes[:-1], chord - slopes[:-1] - bend, bend
+    return h, slopes[:-1], chord - slopes[:-1] - bend, bend
 
 
 def _slopes(t: Floats, values: Floats) -> Floats:

@@ -55,10 +55,10 @@ def _idle(case: Case) -> set[str]:
         return set()
     from crossbody.cases.files.controls import movable
 
-    takes: dict[tuple[str, ...], object] = {
-        ("ctrl", "control", "tick"): case.scene.actuators, ("rank", "assemble"): case.scene.loops,
-        ("push",): movable(case.scene), ("friction",): case.scene.pairs,
-        ("a0", "a1"): case.contacts or case.scene.pairs,
+    scene, rows = case.scene, bool(case.contacts or case.scene.pairs)
+    takes = {
+        ("ctrl", "control", "tick"): bool(scene.actuators), ("rank", "assemble"): bool(scene.loops),
+        ("push",): bool(movable(scene)), ("friction",): bool(scene.pairs), ("a0", "a1"): rows,
     }  # fmt: skip
     return {name for names, what in takes.items() if not what for name in names}
 

@@ -9,11 +9,10 @@ import resource
 import subprocess
 import sys
 from pathlib import Path
-from statistics import median
 
 import pytest
 
-RUNS, ASKED = 9, 0.8  # s
+RUNS, ASKED = 9, 0.7  # s
 SCRIPT = """
 import os
 import sys
@@ -53,7 +52,7 @@ def once(out: Path) -> tuple[float, float]:
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="needs the scheduler's account")
 def test_a_run_is_judged_within_what_is_asked(tmp_path: Path) -> None:
     once(tmp_path / "warm")
-    until, whole = (median(times) for times in zip(*(once(tmp_path / str(k)) for k in range(RUNS)), strict=True))
+    until, whole = map(min, zip(*(once(tmp_path / str(k)) for k in range(RUNS)), strict=True))  # others only add to it
     print(f"\nprocessor time of a run until its verdicts are shown {until:.2f} s, with its pages {whole:.2f} s")
     assert until < whole
     assert until < ASKED
