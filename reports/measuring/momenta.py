@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Acts, Case, Inputs, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.measuring.equations import equations, finite
+from crossbody.reports.measuring.impulse import stopping
 from crossbody.reports.measuring.scale import of_like
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ class Unexplained:
 
     Attributes:
         whole: of the steps over which forces change most, together.
-        middle: the median of the steps.
+        middle: of the step in the middle of all, by what each leaves.
         size: what half of these changes comes to, as part of all that moves.
     """
 
@@ -67,7 +68,7 @@ def unexplained(run: Trajectory, case: Case) -> Unexplained | None:
     off = {rule: _sizes(M, rates) for rule, rates in left.items()}
     return Unexplained(
         whole={rule: float(np.sqrt(np.sum(each[most]) / np.sum(half[most]))) for rule, each in off.items()},
-        middle={rule: float(np.median(np.sqrt(each / half))) for rule, each in off.items()},
+        middle={rule: float(np.sqrt(np.sort(each / half)[len(at) // 2])) for rule, each in off.items()},
         size=float(np.sqrt(np.sum(half[most]) / np.sum(moves[most]))),
     )
 
@@ -112,6 +113,9 @@ def _steps(run: Trajectory, case: Case, inputs: Inputs | None) -> tuple[NDArray[
     dt = np.diff(run.t)
     changes = np.linalg.norm(np.diff(run.lam, axis=0), axis=1) * dt
     changes[dt <= SHORT * dt.max()] = 0.0
+    if run.acts in (Acts.AT, Acts.GRID):  # friction of a slip that dies out may turn within nanoseconds
+        stops = stopping(run)
+        changes[stops[:-1] | stops[1:]] = 0.0
     within = [event.t for event in run.events if event.impulse] + [switch.t for switch in run.switches]
     for t in (*within, *(() if case.force is None else case.force.breaks)):
         changes[(run.t[:-1] <= t) & (t <= run.t[1:])] = 0.0
