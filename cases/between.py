@@ -50,9 +50,9 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
     known: dict[int, Callable[[Floats], Floats]] = {}
 
     def piece(i: int) -> Callable[[Floats], Floats]:
-        some = _upto(run, *parts[i])
+        some = _samples(run, *parts[i])
         found = known.get(i) or _piece(run.t[some], columns[some], smooth)
-        return known.setdefault(i, found) if some.stop - some.start <= KEPT else found
+        return known.setdefault(i, found) if len(some) <= KEPT else found
 
     def at(times: Floats) -> Trajectory:
         times = np.asarray(times, dtype=np.float64)
@@ -75,9 +75,9 @@ def integrals(run: Trajectory, values: Floats) -> Callable[[Floats], Floats]:
     Of the splines of the same smooth pieces, so that steps of a sixth of a pulse leave 1e-5 of its impulse.
     """
     parts, smooth = _smooth(run)
-    some = [_upto(run, *part) for part in parts]
-    ends = np.array([run.t[one.stop - 1] for one in some])
-    whole = [_integral(run.t[one], values[one], run.t[[one.stop - 1]], smooth)[0] for one in some]
+    some = [_samples(run, *part) for part in parts]
+    ends = np.array([run.t[one[-1]] for one in some])
+    whole = [_integral(run.t[one], values[one], run.t[one[-1:]], smooth)[0] for one in some]
     before = np.cumsum([np.zeros(values.shape[1]), *whole], axis=0)
 
     def at(times: Floats) -> Floats:
@@ -97,9 +97,11 @@ def _smooth(run: Trajectory) -> tuple[list[tuple[int, int]], bool]:
     return list(zip([0, *cuts], [*cuts, len(run.t)], strict=True)), bool(len(cuts)) or bool((run.mode >= 0).any())
 
 
-def _upto(run: Trajectory, first: int, behind: int) -> slice:
-    """Return the samples of a piece, with the one behind it at which its mode has changed."""
-    return slice(first, behind + (behind < len(run.t) and run.t[behind] > run.t[behind - 1]))
+def _samples(run: Trajectory, first: int, behind: int) -> NDArray[np.intp]:
+    """Return the samples of a piece, each instant once, with the one behind it at which its mode has changed."""
+    some = np.arange(first, behind + (behind < len(run.t) and run.t[behind] > run.t[behind - 1]))
+    once: NDArray[np.intp] = some[np.append(True, np.diff(run.t[some]) > 0.0)]
+    return once
 
 
 def multipliers(run: Trajectory) -> Floats | None:
@@ -113,8 +115,6 @@ def multipliers(run: Trajectory) -> Floats | None:
 
 def _integral(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     """Return integrals (m, k) from the first sample of a piece to times (m,), by a spline or trapezoids."""
-    keep = np.append(True, np.diff(t) > 0.0)
-    t, values = t[keep], values[keep]
     if len(t) == 1:
         return np.zeros((len(times), values.shape[1]))
     if smooth:
@@ -125,8 +125,6 @@ def _integral(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
 
 def _piece(t: Floats, values: Floats, smooth: bool) -> Callable[[Floats], Floats]:
     """Return what gives values (m, k) of a piece at times (m,), by splines of what is finite or by straight lines."""
-    keep = np.concatenate([[True], np.diff(t) > 0.0])
-    t, values = t[keep], values[keep]
     finite = np.isfinite(values).all(axis=0) & (smooth and len(t) > 2)
     curve = through(t, values[:, finite]) if finite.any() else None
 

@@ -33,7 +33,7 @@ KINDS = (
 )  # fmt: skip
 OF_FILES = ("judging.known_files", "judging.known_margins")
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""
-OF_SCENES = ("judging.known_scenes", "judging.known_turns")
+OF_SCENES = ("judging.known_scenes", "judging.known_turns", "judging.known_rubs")
 """Of runs of scenes, beside: to compile the kernels of every scene takes half as long as all else of a first run."""
 OF_ENGINES, OF_DRIVES = ("judging.known_engines",), ("judging.known_drives",)
 """Of an engine that runs, beside: others are not imported for it; and of its motors, likewise with those of scenes."""

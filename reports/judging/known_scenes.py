@@ -39,7 +39,8 @@ def wrong() -> tuple[Found, ...]:
     )
 
 
-def _floor() -> Case:
+def ball_on_a_floor() -> Case:
+    """Return a ball that does not turn, on a floor with friction."""
     slides = zip("xyz", map(tuple, np.eye(3).tolist()), strict=True)
     return case_of(Scene(
         bodies=(Body(name="ball", mass=MASS, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), position=(0.0, 0.0, RADIUS)),),
@@ -86,7 +87,7 @@ def _ball() -> Iterator[Asked]:
         "friction_angle": float(off.max()), "friction_power": float(power.max()), "friction_impulse": impulse,
         "friction_work": float(np.abs(works).max()), "energy_residual": float(max(apart)),
         "gap_residual": float(np.abs(run.gap - gaps).max() / np.abs(gaps).max()),
-    }, "a ball that slips", (truth, run), _floor())  # fmt: skip
+    }, "a ball that slips", (truth, run), ball_on_a_floor())  # fmt: skip
     some = replace(run, mode=np.where(np.arange(SAMPLES)[:, None] % 3 == 0, int(Mode.FREE), int(Mode.SLIP))
                    * np.ones(3, dtype=np.int8))  # fmt: skip
     closed = some.mode[:, 0] == Mode.SLIP
@@ -94,7 +95,7 @@ def _ball() -> Iterator[Asked]:
     worst = max(np.abs(normal - law)[closed].max(), np.abs(size - MU * normal)[closed].max())
     yield from said(
         {"law_residual": float(worst / np.abs(law[closed]).max())}, "a ball that slips or flies", (truth, some),
-        _floor(),
+        ball_on_a_floor(),
     )  # fmt: skip
 
 
@@ -112,7 +113,7 @@ def _held() -> Iterator[Asked]:
     longest = float(np.sqrt((impulses**2).sum(axis=1)).max())
     yield from said(
         {"friction_impulse": longest, "friction_work": float(np.abs(works).max())},
-        "a ball that slips in steps", (truth, run), _floor(),
+        "a ball that slips in steps", (truth, run), ball_on_a_floor(),
     )  # fmt: skip
 
 

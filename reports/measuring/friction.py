@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from crossbody.cases.scene_contacts import contacts
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.measuring.impulse import stopping
 from crossbody.reports.measuring.scale import RESTS
+
+if TYPE_CHECKING:
+    from crossbody.reference import System
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,12 +81,17 @@ def rubbed(run: Trajectory, case: Case) -> Rubbing | None:
 
 
 def slips(case: Case, run: Trajectory) -> Floats:
-    """Return the rates of all rows (n, nc) against what their surfaces do by themselves.
+    """Return the rates of all rows (n, nc) against what their surfaces do by themselves."""
+    system = equations(case)
+    assert system is not None
+    return slipped(system, case, run)
+
+
+def slipped(system: System, case: Case, run: Trajectory) -> Floats:
+    """Return the same by equations that are given.
 
     Where discrete variables choose the places of contacts, those of the case's start count until one of them changes.
     """
-    system = equations(case)
-    assert system is not None
     rates: Floats = system.gaps_along(run.q, run.v)[1]
     if system.jumps:
         until = min((one.t for one in run.switches if one.t > 0.0 and not one.smooth), default=np.inf)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Acts, Case, Inputs, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.measuring.equations import equations, finite
-from crossbody.reports.measuring.scale import of_like
+from crossbody.reports.measuring.impulse import stopping
 
 if TYPE_CHECKING:
     from crossbody.reference import System
@@ -40,7 +40,7 @@ class Unexplained:
 
     Attributes:
         whole: of the steps over which forces change most, together.
-        middle: the median of the steps.
+        middle: of the step in the middle of all, by what each leaves.
         size: what half of these changes comes to, as part of all that moves.
     """
 
@@ -67,7 +67,7 @@ def unexplained(run: Trajectory, case: Case) -> Unexplained | None:
     off = {rule: _sizes(M, rates) for rule, rates in left.items()}
     return Unexplained(
         whole={rule: float(np.sqrt(np.sum(each[most]) / np.sum(half[most]))) for rule, each in off.items()},
-        middle={rule: float(np.median(np.sqrt(each / half))) for rule, each in off.items()},
+        middle={rule: float(np.sqrt(np.sort(each / half)[len(at) // 2])) for rule, each in off.items()},
         size=float(np.sqrt(np.sum(half[most]) / np.sum(moves[most]))),
     )
 
@@ -75,20 +75,21 @@ def unexplained(run: Trajectory, case: Case) -> Unexplained | None:
 def unseen(run: Trajectory, case: Case) -> float:
     """Return which part of impulses trapezoids of the samples do not see, or make up, by what velocities gained.
 
-    The largest sum over steps of M dv - dt (f + H' lam), over that of dt H' lam of coordinates of its unit;
-    infinite where nothing tells it.
+    The largest sum over steps of M dv - dt (f + H' lam), over that of dt H' lam, each by the size sqrt(p' M^-1 p) of a
+    momentum p; infinite where nothing tells it, or no sample pushes.
     """
     if (system := _told(run, case)) is None:
         return math.inf
     inputs, steps = _inputs(system, run, case), np.flatnonzero(np.diff(run.t) > 0.0)
-    off, pushed = [], []
+    sums, most = np.zeros((2, len(case.velocities))), np.zeros(2)
     for at in np.array_split(steps, -(-len(steps) // TOGETHER)):
         M, left, _, (_, first, last) = _left(system, run, at, inputs)
-        off.append(np.einsum("mij,mj->mi", M, left[Acts.AT]))
-        pushed.append(np.einsum("mij,mj->mi", M, 0.5 * (first + last)))
-    lost, most = (np.max(np.abs(np.cumsum(np.concatenate(one), axis=0)), axis=0) for one in (off, pushed))
-    sizes = of_like(most, case.velocities)
-    return float(np.max(np.divide(lost, sizes, out=np.zeros(len(lost)), where=sizes > 0.0)))
+        for k, rates in enumerate((left[Acts.AT], 0.5 * (first + last))):
+            momenta = sums[k] + np.cumsum(np.einsum("mij,mj->mi", M, rates), axis=0)
+            inverse: Floats = np.asarray(np.linalg.inv(M), dtype=np.float64)
+            most[k] = max(most[k], float(np.max(_sizes(inverse, momenta))))
+            sums[k] = momenta[-1]
+    return float(np.sqrt(most[0] / most[1])) if most[1] > 0.0 else math.inf
 
 
 def _told(run: Trajectory, case: Case) -> System | None:
@@ -112,6 +113,9 @@ def _steps(run: Trajectory, case: Case, inputs: Inputs | None) -> tuple[NDArray[
     dt = np.diff(run.t)
     changes = np.linalg.norm(np.diff(run.lam, axis=0), axis=1) * dt
     changes[dt <= SHORT * dt.max()] = 0.0
+    if run.acts in (Acts.AT, Acts.GRID):  # friction of a slip that dies out may turn within nanoseconds
+        stops = stopping(run)
+        changes[stops[:-1] | stops[1:]] = 0.0
     within = [event.t for event in run.events if event.impulse] + [switch.t for switch in run.switches]
     for t in (*within, *(() if case.force is None else case.force.breaks)):
         changes[(run.t[:-1] <= t) & (t <= run.t[1:])] = 0.0
@@ -154,6 +158,6 @@ def _push(H: Floats, lam: Floats) -> Floats:
 
 
 def _sizes(M: Floats, rates: Floats) -> Floats:
-    """Return v' M v (m,)."""
+    """Return v' M v (m,), or p' M^-1 p."""
     found: Floats = np.einsum("mi,mij,mj->m", rates, M, rates)
     return found

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crossbody.cases import Case, Trajectory
 from crossbody.cases.arrays import Floats
@@ -29,7 +30,6 @@ from crossbody.reports.measuring.impulse import (
     integrated,
     multipliers,
     true_impulse,
-    with_collisions,
 )
 from crossbody.reports.measuring.placed import Placed, largest, of_rows
 from crossbody.reports.measuring.scale import idle
@@ -84,22 +84,20 @@ def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
     many; N s where only the run's does. Nothing is compared behind where slips are too slow to tell their friction.
     """
     run = before(run, truth.firm) if truth.firm < math.inf else run
-    own = counts_itself(run, truth.trajectory)
-    inside, exact = aligned(truth, run, case, releases=not own)
-    if not inside.any() or truth.trajectory.counts.get("redundant", 0):
+    found = _beside(truth, run, case, multipliers)
+    if found is None or truth.trajectory.counts.get("redundant", 0):
         return None
     if np.isnan(run.lam).any():
         return math.nan
-    if not own:
-        run, exact = before_stops(run, exact)
-    theirs = true_impulse(run, exact, truth.trajectory)
+    inside, exact, mine, theirs = found
+    theirs = collided(exact.t, theirs, truth.trajectory.events)
     scale = float(np.max(whole(theirs, case), initial=0.0))
     smooth = away(exact, [event.t for event in truth.trajectory.events if event.impulse], case.t_end)
     smooth &= away(run, [event.t for event in run.events if event.impulse], case.t_end)[inside]
-    off = whole(with_collisions(run, run.events)[inside] - theirs, case)[smooth]
+    off = whole(collided(run.t[inside], mine, run.events) - theirs, case)[smooth]
     scale = max(scale, idle(truth.trajectory) * case.t_end) if scale else 0.0
-    found = largest(off, run.t[inside][smooth], of_rows(case, "N s", "N m s"), scale or 1.0)
-    return found if scale else found or None
+    most = largest(off, run.t[inside][smooth], of_rows(case, "N s", "N m s"), scale or 1.0)
+    return most if scale else most or None
 
 
 def friction_impulse(truth: Truth, run: Trajectory, case: Case) -> float | None:
@@ -143,9 +141,23 @@ def _apart(
     truth: Truth, run: Trajectory, case: Case, signal: Signal, unit: str, of: Callable[[Floats], Floats]
 ) -> Placed | None:
     """Return the largest size `of` differences of integrals of a signal."""
-    inside, exact = aligned(truth, run, case, releases=not counts_itself(run, truth.trajectory))
+    if (found := _beside(truth, run, case, signal)) is None:
+        return None
+    inside, _, mine, theirs = found
+    return largest(of(mine - theirs).max(axis=1, initial=0.0), run.t[inside], [("", unit)])
+
+
+def _beside(
+    truth: Truth, run: Trajectory, case: Case, signal: Signal
+) -> tuple[NDArray[np.bool_], Trajectory, Floats, Floats] | None:
+    """Return which samples (n,) of a run have a counterpart, the truth at these, and the integrals of both (m, k).
+
+    None where none has one. Where samples follow what forces do the one before counts at which a slip stops.
+    """
+    own = counts_itself(run, truth.trajectory)
+    inside, exact = aligned(truth, run, case, releases=not own)
     if not inside.any():
         return None
-    mine, theirs = cumulated(run, *signal(run))[inside], beside(run, exact, truth.trajectory, signal)
-    off = of(mine - theirs).max(axis=1, initial=0.0)
-    return largest(off, run.t[inside], [("", unit)])
+    if not own:
+        run, exact = before_stops(run, exact)
+    return inside, exact, cumulated(run, *signal(run))[inside], beside(run, exact, truth.trajectory, signal)

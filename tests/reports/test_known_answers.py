@@ -53,7 +53,9 @@ BOX = Path(__file__).parents[1] / "support" / "driven_box.xml"
 KNOWN = (*known.kinds(), *known.kinds(known.OF_FILES))
 
 
-@pytest.mark.parametrize("module", KNOWN, ids=lambda module: module.__name__.rpartition(".")[2])
+@pytest.mark.parametrize(
+    "module", [*KNOWN, *known.kinds(known.OF_SCENES)], ids=lambda module: module.__name__.rpartition(".")[2]
+)
 def test_what_is_right_is_not_told(module: Any) -> None:
     assert module.wrong() == ()
 
