@@ -72,9 +72,9 @@ def _halves() -> Iterator[Within]:
         count = math.hypot(*stds) ** 4 * (HALF - 1) / sum(std**4 for std in stds)
         told = f"halves of data that differ by {2.0 * apart:g}"
         for k in range(2):
-            yield f"size of half {k}", told, abs(said.values[k]), abs(means[k]), EXACT
+            yield f"value of half {k}", told, said.values[k], means[k], EXACT
             yield f"deviation of half {k}", told, said.stds[k], stds[k], EXACT
-        yield "difference of halves", told, abs(said.values[0] - said.values[1]), abs(means[0] - means[1]), EXACT
+        yield "difference of halves", told, said.values[0] - said.values[1], means[0] - means[1], EXACT
         yield "probability", told, said.probability, 2.0 * float(stats.t.sf(z, count)), EXACT
         yield "agree", told, float(said.agrees), float(apart == 0.0), 0.0
 
