@@ -30,8 +30,8 @@ def agreement(
     """Estimates of the halves, for every parameter that both tell.
 
     Args:
-        J: derivatives by all unknowns (N, P); the first are the parameters.
-        residual: (N,).
+        J: derivatives of what is predicted by all unknowns (N, P); the first are the parameters.
+        residual: what is measured less that (N,).
         layout: of the residuals.
         x: solution (P,).
         scale: sizes of the unknowns (P,).
@@ -82,7 +82,7 @@ def _halves(layout: Layout) -> list[tuple[NDArray[np.int64], Layout]]:
 def _estimated(
     J: Floats, residual: Floats, layout: Layout, scale: Floats
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
-    """Step, standard deviations, degrees of freedom, and whether the data tell each unknown."""
+    """Step, standard deviations, degrees of freedom, and whether the data tell each unknown, by a prediction's J."""
     told = information(J, scale)
     step = told.weights.T @ residual
     spread = scatter(told.basis, told.weights, residual - told.basis @ (told.basis.T @ residual), layout)
@@ -124,7 +124,7 @@ def moves(problem: Exact, x: Floats, sizes: Floats, fixed: Sequence[int]) -> dic
         return {}
     parts = [_projected(joint, j, z, loose) for j in range(len(joint.cut))]
     J, r = (np.concatenate([part[i] for part in parts]) for i in range(2))
-    step, std, freedom, seen = _estimated(J, r, joint.layout, sizes[loose])
+    step, std, freedom, seen = _estimated(-J, r, joint.layout, sizes[loose])
     limit = np.atleast_1d(stats.t.isf(0.5 * UNLIKELY / len(loose), freedom))
     return {
         int(i): Move(by=float(b), std=float(s), refuted=bool(abs(b) > q * s))

@@ -73,7 +73,7 @@ def judged(search: Search) -> Fit:
     estimates = tuple(_estimates(search, spread, loose[own], blind, open_, flat))
     unseen = _unseen(search, null, spread, loose[own], blind)
     halves = agreement(
-        J, found.residual, problem.layout, x, search.sizes, free, [*found.kept, *np.flatnonzero(found.active)]
+        -J, found.residual, problem.layout, x, search.sizes, free, [*found.kept, *np.flatnonzero(found.active)]
     )  # fmt: skip
     sizes = np.where(np.abs(x) > 1e-9 * np.abs(search.x0), search.sizes, np.maximum(search.sizes, np.abs(search.x0)))
     off = problem.checked(x, J, sizes[:count], limits[0])

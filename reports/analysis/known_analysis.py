@@ -30,14 +30,16 @@ from crossbody.reports.analysis import bode, numbers
 from crossbody.reports.analysis.counterparts import compared, counterparts
 from crossbody.reports.analysis.loci import limits, root_locus
 from crossbody.reports.analysis.places import MOVING, Place, places
+from crossbody.reports.analysis.steps import largest_step
 from crossbody.reports.analysis.summary import MOVES, NEUTRAL, STABLE, UNSTABLE, summary
 from crossbody.reports.judging.asked import Asked, Found, unlike_by
 from crossbody.reports.judging.verdict import Word
 
 MASS, SPRING, DRAG, GRAVITY, GEAR = 1.5, 60.0, 3.0, 9.81, 0.7
 """Of a weight on a spring, SI."""
-EXACT, SOLVED = 1e-9, 1e-7
-"""Part of a number by which sums in another order differ, and to which equations are solved and differentiated."""
+EXACT, SOLVED, SEARCHED = 1e-9, 1e-7, 1e-5
+"""Part of a number by which sums in another order differ, to which equations are solved and differentiated, and to
+which steps are searched for."""
 OMEGA = np.array([0.1, 3.0, 6.2, 6.5, 40.0, 900.0])
 
 
@@ -74,6 +76,8 @@ def _weight() -> Iterator[Asked]:
     for name, matrix in wanted.items():
         for one, must in zip(np.ravel(getattr(full, name)).tolist(), np.ravel(matrix).tolist(), strict=True):
             yield name, "a weight on a spring", one, must
+    drag, stiffness = DRAG / MASS, SPRING / MASS  # v+ = v - h (k x + c v)/(1 + h c), x+ = x + h v+
+    yield from _step(place, (drag + math.sqrt(drag**2 + 4.0 * stiffness)) / stiffness, "a weight on a spring")
     decay, size = DRAG / (2.0 * MASS), math.sqrt(SPRING / MASS)
     for row, sign in zip(_rows(numbers.poles([place])), (1.0, -1.0), strict=True):
         told = {
@@ -84,6 +88,11 @@ def _weight() -> Iterator[Asked]:
         }
         for name, must in told.items():
             yield name, "a weight on a spring", row[name], must
+
+
+def _step(place: Place, wanted: float, what: str) -> Iterator[Asked]:
+    """Yield 1 if the largest stable step is found as far as it is searched for, else 0."""
+    yield "step", what, float(abs(largest_step(place)[0] / wanted - 1.0) <= SEARCHED), 1.0
 
 
 def _model(damping: float = DRAG / MASS, stiffness: float = SPRING / MASS) -> LinearModel:
@@ -230,6 +239,8 @@ def _ball() -> Iterator[Asked]:
     for place in found:
         for k, name in enumerate(("a0", "a1")):
             yield "A", "a ball that lies", float(place.linearised(reduce=False).A[1, k]), -case.number(name)
+        a0, a1 = case.number("a0"), case.number("a1")  # h+' = h' - dt (a0 h + a1 h')
+        yield from _step(place, (math.sqrt(a1**2 + 4.0 * a0) - a1) / a0, "a ball that lies")
     yield from _of_engines(found, "a ball that lies")
 
 

@@ -29,7 +29,7 @@ KINDS = (
     "judging.known_impulses", "judging.known_growth", "judging.known_parts", "judging.known_steps",
     "judging.known_tables", "judging.known_equations", "judging.known_sentences", "judging.known_clocks",
     "pages.known_pages", "judging.known_verdicts", "judging.known_audits", "judging.known_arithmetic",
-    "judging.known_samples", "judging.known_places", "judging.known_sizes",
+    "judging.known_samples", "judging.known_places", "judging.known_sizes", "judging.known_forces",
 )  # fmt: skip
 OF_FILES = ("judging.known_files", "judging.known_margins")
 """Of runs of files, beside: compilers take longer to import than all else that a short run does."""

@@ -88,14 +88,15 @@ def _belongs(case: Case, key: str, value: float) -> bool:
 
 
 def _same(values: ArrayLike, units: list[str], mine: tuple[ArrayLike, list[str]] | None, kept: tuple[str, ...]) -> bool:
-    """Return whether each number is larger as its unit says, with those kept that no parameter has, or as it was."""
+    """Return whether rows of numbers are larger as their units say, but for those that are `kept`, or as before."""
     before, after = (np.asarray(one, dtype=np.float64) for one in (values, np.nan if mine is None else mine[0]))
     if before.shape != after.shape:
         return False
     near = SAME * max(1e-3, float(np.abs(before[np.isfinite(before)]).max(initial=0.0)))
     with np.errstate(invalid="ignore"):  # of bounds that are infinite
-        off = [np.abs(after - before * [times(unit, own) for unit in units]) for own in ((), kept)]
-    return any(bool(np.all((one <= near) | (after == before))) for one in off)
+        off = [np.abs(after - before * [times(unit, own) for unit in units]) <= near for own in ((), kept)]
+    as_was = (after == before) if before.ndim < 2 else (after == before).all(axis=1, keepdims=True)
+    return any(bool(np.all(one | (after == before) & (before == 0.0) | as_was)) for one in off)
 
 
 def _numbers(case: Case) -> Numbers:
@@ -103,8 +104,8 @@ def _numbers(case: Case) -> Numbers:
     found: dict[str, tuple[ArrayLike, list[str]]] = {
         "positions": (case.q0, [one.unit for one in case.coordinates]),
         "velocities": (case.v0, [f"{one.unit}/s" for one in case.velocities]),
-        "horizon": (case.t_end, ["s"]), "a0": (case.law.a0, ["1/s^2"]), "a1": (case.law.a1, ["1/s"]),
-        "b0": (case.law.b0, ["1/s^2"]), "b1": (case.law.b1, ["1/s"]),
+        "horizon": (case.t_end, ["s"]), "laws": (_laws(case), ["1/s", "1/s"]),
+        "fast laws": (_laws(case, fast=True), ["1/s", "1/s"]),
     }  # fmt: skip
     if case.inputs is not None:
         found["instants of inputs"] = (case.inputs.times, ["s"])
@@ -117,6 +118,13 @@ def _numbers(case: Case) -> Numbers:
         if math.isfinite(claim.expected):
             found[f"{CLAIMED} {claim.metric}"] = (claim.expected, [known[claim.metric].UNIT])
     return found | dict(_of_scene(case))
+
+
+def _laws(case: Case, fast: bool = False) -> ArrayLike:
+    """Return the root of each row's stiffness, and its damping (nc, 2), 1/s: one does not change without the other."""
+    law = case.law
+    pairs = (law.b0, law.b1) if fast else (law.a0, law.a1)
+    return np.stack([np.sqrt(pairs[0]), pairs[1]], axis=1)
 
 
 def _of_scene(case: Case) -> Iterator[tuple[str, tuple[ArrayLike, list[str]]]]:

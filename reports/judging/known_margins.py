@@ -38,7 +38,9 @@ MJCF = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
 <site site="hook"/><site site="eye"/></spatial>
 <fixed name="sum"><joint joint="knee" coef="1"/><joint joint="rail" coef="2"/></fixed>
 <fixed name="other"><joint joint="rail" coef="-1"/></fixed></tendon>
-<actuator><motor name="push" joint="rail" gear="3" armature="0.04" damping="0.5"/></actuator></mujoco>"""
+<actuator><motor name="push" joint="rail" gear="3" armature="0.04" damping="0.5"/>
+<general name="soft" joint="rail" gaintype="affine" gainprm="2 0.3 0.04"/>
+<general name="hard" joint="rail" gaintype="fixed" gainprm="5 0.6 0.07"/></actuator></mujoco>"""
 
 
 @cache
@@ -78,6 +80,8 @@ def _unusual() -> Iterator[Asked]:
                               "damping": (0.4, *none[:2]), "friction_loss": 0.2, "rest": (away,) * 2,
                               "law": usual},
         ("tendons", "sum"): {"coefficients": (1.0, 2.0), "rest": (0.0, 0.0)},
+        ("actuators", "soft"): {"joint": "rail", "gain": (2.0, 0.3, 0.04), "bias": none},
+        ("actuators", "hard"): {"joint": "rail", "gain": (5.0, 0.0, 0.0), "bias": none},
         ("actuators", "push"): {"joint": "rail", "armature": 0.04, "damping": 0.5,
                                 "gear": (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)},
     }  # fmt: skip

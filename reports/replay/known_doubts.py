@@ -19,9 +19,10 @@ from scipy import stats
 from crossbody import hw
 from crossbody.cases.arrays import Floats
 from crossbody.hw.fitting.covariance import Layout, scatter
-from crossbody.hw.fitting.doubts import agreement
+from crossbody.hw.fitting.derivative import Exact
+from crossbody.hw.fitting.doubts import agreement, moves
 from crossbody.hw.windows.whiteness import Correlation, autocorrelation, crosscorrelation, stride_of
-from crossbody.hw.windows.window import recorded_inputs
+from crossbody.hw.windows.window import recorded_inputs, windows
 from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.replay import comparison
 from crossbody.reports.replay import known_replay as known
@@ -49,7 +50,7 @@ delay = 0.02
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of what, where it is another one."""
-    kinds = (_halves, _correlated, _channels, _unseen, _held, _residuals, _tables, _delayed, _turns)
+    kinds = (_halves, _correlated, _channels, _unseen, _held, _moved, _residuals, _tables, _delayed, _turns)
     return unlike(kinds, "doubt", "data that end in")
 
 
@@ -71,9 +72,9 @@ def _halves() -> Iterator[Within]:
         count = math.hypot(*stds) ** 4 * (HALF - 1) / sum(std**4 for std in stds)
         told = f"halves of data that differ by {2.0 * apart:g}"
         for k in range(2):
-            yield f"size of half {k}", told, abs(said.values[k]), abs(means[k]), EXACT
+            yield f"value of half {k}", told, said.values[k], means[k], EXACT
             yield f"deviation of half {k}", told, said.stds[k], stds[k], EXACT
-        yield "difference of halves", told, abs(said.values[0] - said.values[1]), abs(means[0] - means[1]), EXACT
+        yield "difference of halves", told, said.values[0] - said.values[1], means[0] - means[1], EXACT
         yield "probability", told, said.probability, 2.0 * float(stats.t.sf(z, count)), EXACT
         yield "agree", told, float(said.agrees), float(apart == 0.0), 0.0
 
@@ -143,6 +144,32 @@ def _held() -> Iterator[Within]:
         yield "worse", "a fit of known errors", other.worse, wanted, EXACT
 
 
+def _moved() -> Iterator[Within]:
+    """Yield by how much a free start moves an inertia, how well it is known then, and whether noise explains that.
+
+    To first order: of what a start makes of angles, 1 and T (1 - e^(-t/T)), nothing is left in residuals, nor in the
+    derivative by the inertia.
+    """
+    t: Floats = known.STEP * np.arange(known.SAMPLES, dtype=np.float64)
+    settles = (known.INERTIA + known.MASS * known.REACH**2) / known.DRAG
+    log, model = known.link_log(0.0, known.NOISE), hw.models.load("single_pendulum")
+    start = np.column_stack([np.ones(known.SAMPLES), settles * (1.0 - np.exp(-t / settles))])
+    cut, more = windows(log, model, 0.0), 1e-4 * known.INERTIA
+    J: Any = (known.turned(t, known.INERTIA + more) - known.turned(t, known.INERTIA - more)) / (2.0 * more)
+    J = J - start @ np.linalg.lstsq(start, J, rcond=None)[0]
+    for off, refuted in ((0.0, False), (1e-2, True), (-1e-2, True)):
+        inertia, told = (1.0 + off) * known.INERTIA, f"an inertia {off:g} off"
+        left = log.channel("coordinates", "th1").values - known.turned(t, inertia)
+        by = float(J @ left) / float(J @ J)
+        rest = left - start @ np.linalg.lstsq(start, left, rcond=None)[0] - by * J
+        std = math.sqrt(float(rest @ rest) / (known.SAMPLES - 3) / float(J @ J))
+        problem = Exact(model, {**model.numbers(known.GIVEN), "I1": inertia}, ["I1"], cut, False, 1)
+        found = moves(problem, np.array([inertia]), np.array([known.INERTIA]), [])[0]
+        yield "move by free starts", told, found.by, by, 0.02 * abs(by) + 0.1 * std
+        yield "deviation with free starts", told, found.std, std, DRAWN * std
+        yield "refuted", told, float(found.refuted), float(refuted), 0.0
+
+
 def _residuals() -> Iterator[Within]:
     """Yield at which lag a residual follows an input, how much is inside a band, and how long means may be."""
     draw = np.random.default_rng(13)
@@ -162,6 +189,7 @@ def _tables() -> Iterator[Within]:
     """Yield how much is inside a band on both of its sides, and rows of what pages show of residuals."""
     lags = Correlation(lags=np.arange(4), values=np.array([1.0, -0.9, 0.01, 0.5]), band=0.1)
     yield "inside", "a residual that changes its sign", lags.inside, 1.0 / 3.0, EXACT
+    yield "inside", "a residual against an input", replace(lags, lags=lags.lags + 1).inside, 1.0 / 4.0, EXACT
     replayed = hw.replay(_log(), "ball", restart=0.0)
     (one,) = replayed.predictions[:1]
     told, some, shown = "a replay of a ball", 7, comparison.residuals(replayed, points=7)

@@ -5,6 +5,7 @@ A body with the angular velocity w in its own axes has R(t) = R(0) exp(t [w]), w
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import cache
 
@@ -16,15 +17,27 @@ from crossbody.hw.windows import turns
 from crossbody.hw.windows.whiteness import autocorrelation
 from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.judging.known_turns import about
+from crossbody.reports.replay.known_replay import read
 
 STEP, SLOW = 0.01, 3e-3
 """Between samples, s, and the part by which a clock is slow."""
+LONG, ALIKE = 600, 0.03
+"""Samples of a motion, and the part by which its own bends hide the size of a slip."""
+DAMAGED = """
+[time]
+column = "t"
+unit = "s"
+sample_time = 0.01
+[coordinates.a]
+column = "a"
+unit = "m"
+"""
 
 
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    return unlike((_looked, _turning), "log", "a record that ends in")
+    return unlike((_looked, _damaged, _turning), "log", "a record that ends in")
 
 
 def _looked() -> Iterator[Within]:
@@ -45,6 +58,27 @@ def _looked() -> Iterator[Within]:
     yield "jitter", "a clock that is slow", clock.jitter, 0.0, 1e-6 * STEP
     draw = np.random.default_rng(9).normal(size=400)
     yield "band", "a white residual", autocorrelation(draw).band, 2.5758293035489 / 20.0, 1e-6
+
+
+def _damaged() -> Iterator[Within]:
+    """Yield where values are said to slip or to have spikes, and by how much, of motions without and with some."""
+    t = STEP * np.arange(LONG, dtype=np.float64)
+    moves, text = np.sin(3.0 * t) + 0.7 * np.sin(7.3 * t + 1.0), ["t,a"]
+    for what, check, at, size in (
+        ("no fault", "", 0, 0.0), ("a slip", "slips", 200, 0.5), ("a slip back", "slips", 260, -0.5),
+        ("a spike", "spikes", 301, 0.4),
+    ):  # fmt: skip
+        off = size * (np.arange(LONG) >= at if check == "slips" else np.arange(LONG) == at)
+        rows = [f"{a!r},{b!r}" for a, b in zip(t.tolist(), (moves + off).tolist(), strict=True)]
+        found = read("\n".join([*text, *rows]), DAMAGED).findings
+        told = f"a motion with {what}"
+        yield "findings", told, float(len(found)), float(bool(check)), 0.0
+        for one in found:
+            said = re.search(r"by ([+-]\S+) m", one.text)
+            yield "kind", told, float(one.check != check), 0.0, 0.0
+            yield "row", told, float(one.row), float(at), 0.0
+            yield "instant", told, one.t, STEP * at, 1e-9
+            yield "size", told, float(said[1]) if said else np.nan, size, ALIKE * abs(size)
 
 
 def _turning() -> Iterator[Within]:

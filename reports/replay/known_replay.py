@@ -106,6 +106,10 @@ unit = "rpm"
 """
 UNLIKE = 2e-3
 """Noise of a ball's height, m."""
+UNITS = {"fit": "%", "delay": "s", "speed": "s/s", "windows_failed": "1", "impacts_too_many": "1",
+         "autocorrelation_inside": "%", "impulse_measured": "N s", "impulse_error": "N s",
+         "impact_offset_median": "s", "impact_offset_largest": "s"}  # fmt: skip
+"""Of metrics of a ball that are no lengths."""
 WALL = 0.5
 """Time that a prediction is told to have taken, s."""
 
@@ -279,6 +283,8 @@ def _ball() -> Iterator[Within]:
     ahead = G * (ages * DELAY + 0.5 * DELAY**2)
     told = "a ball that is recorded late"
     yield "windows", told, float(len(found.windows)), 2.0, 0.0
+    for row in found.rows():
+        yield "unit", f"{row.metric}, {row.unit}", float(row.unit != UNITS.get(row.metric, "m")), 0.0, 0.0
     yield "bias", told, rows["bias"], math.fsum(ahead) / len(ahead), CLOSE
     yield "rmse", told, rows["rmse"], math.sqrt(math.fsum(ahead**2) / len(ahead)), CLOSE
     yield "largest", told, rows["largest"], float(ahead.max()), CLOSE

@@ -66,6 +66,28 @@ def test_measured_starts_that_are_wrong_are_found_out() -> None:
     assert any("whose noise the intervals do not include" in warning for warning in fit.warnings)
 
 
+@pytest.mark.parametrize("starts", ["measured", "free"])
+def test_halves_of_a_log_are_told_as_what_each_is(starts: str) -> None:
+    """The friction of the joint grows by a quarter amid the log: the first half has less of it."""
+    t, drag = np.arange(0.0, 16.0, STEP), 0.2 * np.array([0.9, 1.15])
+    y, found = np.array([2.5, 0.0]), []
+    for part, k in zip(np.split(t, [len(t) // 2]), drag, strict=True):
+        ends = (part[0], part[-1] + STEP)
+        ran = solve_ivp(
+            lambda _, y, k=k: [y[1], 58.0 * np.sin(y[0]) - k * y[1]], ends, y, t_eval=[*part, ends[1]], rtol=1e-11,
+            atol=1e-12,
+        )  # fmt: skip
+        y = ran.y[:, -1]
+        found.append(ran.y[0, :-1])
+    motion = np.concatenate(found) + NOISE * np.random.default_rng(1).standard_normal(len(t))
+    log = log_of(t, channels("coordinates", "rad", {"th1": motion}))
+    fit = hw.identify(log, "single_pendulum", ["k1"], restart=1.0, parameters=truth(), starts=starts)
+    (half,) = fit.agreement
+    per_rate = truth()["k1"] / 0.2
+    np.testing.assert_allclose(half.values, drag * per_rate, rtol=0.05)
+    assert not half.agrees
+
+
 def test_a_step_from_measured_starts_is_one_of_all_unknowns() -> None:
     """The Schur complement of every window leaves the step of the parameters that the whole problem makes."""
     model = models.load("single_pendulum")
@@ -75,7 +97,7 @@ def test_a_step_from_measured_starts_is_one_of_all_unknowns() -> None:
     z = joint.first()
     J = joint.jacobian(z)
     size = np.linalg.norm(J, axis=0)
-    step = np.linalg.lstsq(J / size, joint.residual(z), rcond=None)[0] / size
+    step = -np.linalg.lstsq(J / size, joint.residual(z), rcond=None)[0] / size  # J is that of residuals
     found = moves(measured, z[:2], np.abs(z[:2]), ())
     np.testing.assert_allclose([found[i].by for i in range(2)], step[:2], rtol=1e-6)
     assert set(moves(measured, z[:2], np.abs(z[:2]), (0,))) == {1}
