@@ -117,3 +117,43 @@ def test_a_can_lands_beside_a_capsule_that_sticks(rtol: float) -> None:
     )  # fmt: skip
     other = simulate(system(alone, case_of(alone).law), q0[3:], v0[3:], 1.5, rtol=rtol)
     assert np.abs(run.q[-1, 3:] - other.q[-1]).max() < 1e4 * rtol
+
+
+def rolling_can() -> tuple[Scene, list[float], list[float]]:
+    """Return a can on whose side a ball turns by a ball joint: it slides, tilts, rolls on its rim and stands again."""
+    scene = Scene(
+        bodies=(
+            Body(name="can", mass=1.4353918060068598,
+                 com=(0.1379125213061613, -0.16766089869612466, 0.3659768747906432),
+                 inertia=(0.7341695921838506, 0.8866051477120641, 0.8905815612005783, 0, 0, 0)),
+            Body(name="ball", parent="can", position=(1.6416824243048682, 1.0685748768634342, 0.31919810772918206),
+                 mass=0.6388005533364657,
+                 inertia=(0.38000455496926505, 0.4165778746081745, 0.23813987891273344, 0, 0, 0)),
+        ),
+        joints=(
+            Joint(name="free", body="can", type="free"),
+            Joint(name="joint", body="ball", type="ball",
+                  anchor=(0.4524937570939716, -0.9067329538912671, -0.7755280275298921)),
+        ),
+        shapes=(
+            FLOOR, Shape(name="can", body="can", type="cylinder", size=(1.0185719988087059, 0.60434661689889, 0.0)),
+            Shape(name="ball", body="ball", size=(0.7701918199295115, 0.0, 0.0)),
+        ),
+        pairs=(
+            on_floor("can", 0.16636863222797238, RowLaw(a0=3248.4240273859605, a1=88.45044772281464)),
+            on_floor("ball", 0.2742529309789744, RowLaw(a0=35.893078332259186, a1=0.0)),
+        ),
+    )  # fmt: skip
+    q0 = [0.0, 0.0, 0.60434661689889, 1.0, 0.0, 0.0, 0.0, 0.9663151770026113, -0.02724005502276191, 0.22979277265063042,
+          0.11264208686944872]  # fmt: skip
+    v0 = [0.45484397748700933, -0.4167378599990202, 0.0, 0.0, 0.0, 0.8037369919724906, -0.583092733573168,
+          0.441442902353775, -0.1262408005136081]  # fmt: skip
+    return scene, q0, v0
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9])
+def test_a_can_that_tilts_from_where_it_stands_slides_where_it_is_fast(rtol: float) -> None:
+    """It turns on a point of its rim that sticks; once it tilts another one is lowest, which is far from still."""
+    scene, q0, v0 = rolling_can()
+    run = simulate(system(scene, case_of(scene).law), q0, v0, 3.7, rtol=rtol)
+    assert run.outcome is Outcome.FINISHED, run.message
