@@ -133,6 +133,8 @@ class Trajectory:
             for, by `dense=True`.
         determined_until: until when the law determines the motion, s; finite where contacts that
             slide share a load as no law says (the message names it `indeterminate`).
+        undetermined_by: by how much other such shares would have moved a contact until the end, m, to first
+            order along this motion; only `compiled` tells.
         unique_until: until when one motion alone keeps the law, s; finite where more than one set
             of sticking, sliding and open contacts does (`modes_not_unique`), or none that was found
             (`sticks_contradict`).
@@ -163,6 +165,7 @@ class Trajectory:
     inputs: Inputs | None = None
     control_s: float = 0.0
     determined_until: float = math.inf
+    undetermined_by: float = 0.0
     unique_until: float = math.inf
     searched_until: float = math.inf
     energy_gained: float = 0.0

@@ -284,6 +284,7 @@ class CompiledRun:
             if self.options.ledger
             else None,
             determined_until=float(state["determined_until"]) if state["indeterminate"] else np.inf,
+            undetermined_by=float(state["open_way"]) if state["indeterminate"] and not state["loops_press"] else 0.0,
             unique_until=float(state["unique_until"]) if state["not_unique"] or state["unmet"] else np.inf,
             energy_gained=float(state["energy_gained"]),
             searched_until=float(state["searched_until"]) if state["not_searched"] else np.inf,

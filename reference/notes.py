@@ -23,7 +23,8 @@ _LOOPS_PRESS = (
     "indeterminate: loops hold a contact that may slide, so that its normal force and friction are "
     "undetermined; it was computed without friction."
 )
-AMOUNTS = ("energy_gained", "energy_handed")  # J, that the notes of the last two name
+_SHARES_MOVE = " Other shares would move a contact by up to {open_way:.2g} m until the end, to first order."
+AMOUNTS = ("energy_gained", "energy_handed", "open_way")  # J, J and m, that notes name
 
 
 def noted(state: Mapping[str, float], loops_press: bool = False) -> str:
@@ -33,5 +34,6 @@ def noted(state: Mapping[str, float], loops_press: bool = False) -> str:
         state: counts by the names of `NOTES`, and `AMOUNTS`.
         loops_press: whether loops hold a contact that may slide.
     """
-    texts = NOTES | ({"indeterminate": _LOOPS_PRESS} if loops_press else {})
+    moved = NOTES["indeterminate"] + (_SHARES_MOVE if state.get("open_way") else "")
+    texts = NOTES | {"indeterminate": _LOOPS_PRESS if loops_press else moved}
     return " ".join(text.format(**state) for name, text in texts.items() if state.get(name))

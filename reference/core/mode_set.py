@@ -8,7 +8,7 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.coulomb import factor_set, solve
-from crossbody.reference.core.friction import has_friction, is_decided, is_dry, slip, small_slip
+from crossbody.reference.core.friction import has_friction, is_decided, is_dry, most_drift, slip, small_slip
 from crossbody.reference.core.jams import JAMMED, determinant
 from crossbody.reference.core.layout import FREE, SLIP, STICK, Model, Work
 from crossbody.reference.core.loops import is_idle, is_loop
@@ -47,7 +47,8 @@ def look(s: Any, m: Model, w: Work) -> None:
             size = slip(m, w, i, w.rate)
             w.slid[i] = w.slides[i] and size > 0.0
             fresh = w.begins[i] or w.since[i] == s.t or (s.jumps and size <= small_slip(s, w, i))
-            w.stands[i] = fresh or not w.slides[i]
+            carried_off = s.jumps and size > most_drift(s, w, i)  # its place has jumped, to where it is faster
+            w.stands[i] = fresh or not (w.slides[i] or carried_off)
             if not w.stands[i] and size > small_slip(s, w, i):
                 for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
                     w.along[c] = (w.hda[c] - w.rest[w.idx[c]]) / size

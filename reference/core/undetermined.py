@@ -175,9 +175,9 @@ def _take_back(s: Any, m: Model, w: Work) -> None:
 def follow_shares(s: Any, m: Model, w: Work, settled: bool) -> None:
     """Account for what is open at the end of a step, or where modes have `settled`; rows as they were last evaluated.
 
-    Leaves s.indeterminate and s.determined_until.
+    Leaves s.indeterminate and s.determined_until, and in s.open_way how far apart two shares may have moved anything.
     """
-    if s.indeterminate:
+    if s.loops_press:
         return
     _account(s, m, w)
     if settled:

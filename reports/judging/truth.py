@@ -274,6 +274,15 @@ def _rechecked(truth: Truth, case: Case) -> Truth:
     return replace(truth, source=truth.source + told, trusted=min(truth.trusted, first.t))
 
 
+_SHARED = "the law does not determine the normal forces of sliding contacts"
+
+
+def _by_shares(run: Trajectory) -> str:
+    """By how much other shares of loads would move a contact of a motion; empty where nobody has told."""
+    far = run.undetermined_by
+    return f"; other shares of the load would move one by up to {far:.2g} m until the end" if far > 0.0 else ""
+
+
 def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Floats) -> Chaos | None:
     """Up to when the motion of a scene can be known, and why no further; None if to the end.
 
@@ -289,7 +298,7 @@ def _horizon(case: Case, truth: Truth, second: Trajectory, t: Floats, grown: Flo
     if not case.general or case.chaos is not None:
         return None
     reasons = [
-        (truth.trajectory.determined_until, "the law does not determine the normal forces of sliding contacts"),
+        (truth.trajectory.determined_until, _SHARED + _by_shares(truth.trajectory)),
         (  # what either has found is so, whatever the bound by which the other did not look for it
             min(truth.trajectory.unique_until, second.unique_until),
             "several sets of sticking, sliding and open contacts satisfy the law, or none is known to",

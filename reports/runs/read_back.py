@@ -34,7 +34,16 @@ SAME = 1e-9
 CLOSE, SIDES = 1e-9, 4
 """Part of the largest by which the truth beside a motion may be another one, but for so many samples beside each event:
 a truth that is integrated anew may tell its instant from the other side."""
-NOT_KEPT = ("switches", "inputs", "sol", "determined_until", "unique_until", "searched_until", "energy_gained")
+NOT_KEPT = (
+    "switches",
+    "inputs",
+    "sol",
+    "determined_until",
+    "undetermined_by",
+    "unique_until",
+    "searched_until",
+    "energy_gained",
+)
 """Of a motion, what pages and later comparisons do not ask for."""
 
 

@@ -14,8 +14,8 @@ from crossbody.reference.tree.system import system
 FLOOR = Shape(name="floor", type="plane")
 
 
-def on_floor(shape: str, mu: float, law: RowLaw) -> Pair:
-    return Pair(name=f"floor:{shape}", first="floor", second=shape, friction=(mu, mu, 0, 0, 0), dimension=3, law=law)
+def on(place: str, shape: str, mu: float, law: RowLaw) -> Pair:
+    return Pair(name=f"{place}:{shape}", first=place, second=shape, friction=(mu, mu, 0, 0, 0), dimension=3, law=law)
 
 
 def hinged() -> tuple[Scene, list[float], list[float]]:
@@ -42,8 +42,8 @@ def hinged() -> tuple[Scene, list[float], list[float]]:
                   size=(0.02049023484763817, 0.01127321096493187, 0.020192501127430956)),
         ),
         pairs=(
-            on_floor("ball", 1.951483195321667, RowLaw(a0=166213.21572885188, a1=3787.535053691653)),
-            on_floor("box", 1.9890230493629066, RowLaw(a0=222810.0629949175, a1=0.0)),
+            on("floor", "ball", 1.951483195321667, RowLaw(a0=166213.21572885188, a1=3787.535053691653)),
+            on("floor", "box", 1.9890230493629066, RowLaw(a0=222810.0629949175, a1=0.0)),
         ),
         gravity=(0.0, 0.0, -100.0),
     )  # fmt: skip
@@ -94,8 +94,8 @@ def beside() -> tuple[Scene, list[float], list[float]]:
             Shape(name="can", body="can", type="cylinder", size=(0.14596333759721256, 0.3690144434730494, 0.0)),
         ),
         pairs=(
-            on_floor("capsule", 1.0616158352777827, RowLaw(a0=12.191803718543222, a1=16.04640021752663)),
-            on_floor("can", 1.4253891738568278, RowLaw(a0=241.10310861266237, a1=0.0)),
+            on("floor", "capsule", 1.0616158352777827, RowLaw(a0=12.191803718543222, a1=16.04640021752663)),
+            on("floor", "can", 1.4253891738568278, RowLaw(a0=241.10310861266237, a1=0.0)),
         ),
     )  # fmt: skip
     q0 = [0.0, 0.9460543334263669, 0.35751798223645476, 0.0, 2.838163000279101, -0.9063549923687968,
@@ -117,3 +117,48 @@ def test_a_can_lands_beside_a_capsule_that_sticks(rtol: float) -> None:
     )  # fmt: skip
     other = simulate(system(alone, case_of(alone).law), q0[3:], v0[3:], 1.5, rtol=rtol)
     assert np.abs(run.q[-1, 3:] - other.q[-1]).max() < 1e4 * rtol
+
+
+def rolling_can() -> tuple[Scene, list[float], list[float]]:
+    """Return a can on whose side a ball turns by a ball joint: it slides, tilts, rolls on its rim and stands again."""
+    scene = Scene(
+        bodies=(
+            Body(name="can", mass=1.4353918060068598,
+                 com=(0.1379125213061613, -0.16766089869612466, 0.3659768747906432),
+                 inertia=(0.7341695921838506, 0.8866051477120641, 0.8905815612005783, 0, 0, 0)),
+            Body(name="ball", parent="can", position=(1.6416824243048682, 1.0685748768634342, 0.31919810772918206),
+                 mass=0.6388005533364657,
+                 inertia=(0.38000455496926505, 0.4165778746081745, 0.23813987891273344, 0, 0, 0)),
+        ),
+        joints=(
+            Joint(name="free", body="can", type="free"),
+            Joint(name="joint", body="ball", type="ball",
+                  anchor=(0.4524937570939716, -0.9067329538912671, -0.7755280275298921)),
+        ),
+        shapes=(
+            FLOOR,
+            Shape(name="wall", type="plane", position=(5.065595783693662, 0.0, 0.0),
+                  orientation=(0.7071067811865476, 0.0, -0.7071067811865475, 0.0)),
+            Shape(name="can", body="can", type="cylinder", size=(1.0185719988087059, 0.60434661689889, 0.0)),
+            Shape(name="ball", body="ball", size=(0.7701918199295115, 0.0, 0.0)),
+        ),
+        pairs=(
+            on("floor", "can", 0.16636863222797238, RowLaw(a0=3248.4240273859605, a1=88.45044772281464)),
+            on("wall", "can", 0.010184479297496296, RowLaw(a0=7342777.451959152, a1=2737.483232656127)),
+            on("floor", "ball", 0.2742529309789744, RowLaw(a0=35.893078332259186, a1=0.0)),
+            on("wall", "ball", 0.16652226205668974, RowLaw(a0=60642.05039328782, a1=0.0)),
+        ),
+    )  # fmt: skip
+    q0 = [-0.18801739569607026, 0.7197079736972247, 0.60434661689889, 1.0, 0.0, 0.0, 0.0, 0.9663151770026113,
+          -0.02724005502276191, 0.22979277265063042, 0.11264208686944872]  # fmt: skip
+    v0 = [0.45484397748700933, -0.4167378599990202, 0.0, 0.0, 0.0, 0.8037369919724906, -0.583092733573168,
+          0.441442902353775, -0.1262408005136081]  # fmt: skip
+    return scene, q0, v0
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9])
+def test_a_can_that_tilts_from_where_it_stands_slides_where_it_is_fast(rtol: float) -> None:
+    """It turns on a point of its rim that sticks; once it tilts another one is lowest, which is far from still."""
+    scene, q0, v0 = rolling_can()
+    run = simulate(system(scene, case_of(scene).law), q0, v0, 3.721, rtol=rtol)
+    assert run.outcome is Outcome.FINISHED, run.message

@@ -5,9 +5,11 @@ The second machine takes shares that are not of least norm; nothing of the rule 
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
-from friction_scenes import HALF, G, box_on_floor, run, tipped
+from friction_scenes import HALF, Body, G, Joint, RowLaw, Scene, Shape, box_on_floor, pair, run, tipped
 from scipy.optimize import linprog
 
 from crossbody.reference.kinds import Floats
@@ -95,3 +97,39 @@ def test_no_motion_is_determined_for_longer_than_shares_move_nothing(spin: float
     until = min(one.determined_until, one.t[-1])
     assert until > 0.0
     assert 0.5 * _open_accelerations(1.0, spin, 0.3) * until**2 <= PARTED
+
+
+LIFTED, HALVES = 1e-7, (0.2, 0.15, 0.1)  # m: of feet that bear nothing then, and of a box
+
+
+def on_feet(mu: float, lifted: tuple[int, ...]) -> Scene:
+    """Return a box of 1 kg on four round feet, some of them lifted by so little that only what they bear differs."""
+    a, b, c = HALVES
+    inertia = ((b * b + c * c) / 3.0, (a * a + c * c) / 3.0, (a * a + b * b) / 3.0, 0.0, 0.0, 0.0)
+    feet = tuple(
+        Shape(name=f"foot {k}", body="box", size=(0.02, 0.0, 0.0),
+              position=(x * a, y * b, 0.02 - c + LIFTED * (k in lifted)))
+        for k, (x, y) in enumerate(product((-1, 1), (-1, 1)))
+    )  # fmt: skip
+    return Scene(
+        bodies=(Body(name="box", mass=1.0, inertia=inertia),), joints=(Joint(name="free", body="box", type="free"),),
+        shapes=(Shape(name="floor", type="plane"), *feet),
+        pairs=tuple(pair("floor", foot.name, mu, RowLaw(a0=1e4, a1=200.0)) for foot in feet),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 30))])
+def test_a_box_that_spins_says_how_far_other_shares_would_move_it(seed: int) -> None:
+    """Without one foot, or two, the others bear it all, which is a share too: it stays within what is said."""
+    rng = np.random.default_rng(seed)
+    mu, v, T = float(rng.uniform(0.05, 0.8)), [*rng.normal(size=2), 0, 0, 0, float(10 ** rng.uniform(-1, 1.2))], 0.4
+    q0 = [0.0, 0.0, HALVES[2], 1.0, 0.0, 0.0, 0.0]
+    one = run(on_feet(mu, ()), q0, v, T, rtol=1e-8)
+    far = one.undetermined_by
+    assert (far > 0.0) == (one.determined_until < T)
+    assert (f"by up to {far:.2g} m until the end" in one.message) == (far > 0.0)
+    for lifted in ((0,), (1,), (3,), (0, 3), (1, 2)):
+        other = run(on_feet(mu, lifted), q0, v, T, rtol=1e-8)
+        turned = 2.0 * abs(other.q[-1, 6] - one.q[-1, 6])
+        apart = np.hypot(*(other.q[-1, :2] - one.q[-1, :2])) + turned * np.hypot(*HALVES[:2])
+        assert apart <= far + 1e3 * LIFTED
