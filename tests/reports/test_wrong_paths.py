@@ -49,7 +49,8 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("run arm.xml --ctrl empty.csv", "Controls empty.csv: No columns to parse from file; valid: a table with "),
         ("run arm.xml --control pid.py:Pid --tick 1", "There is no controller file 'pid.py'; there is no other *.py"),
         ("analyse delta_impulse --at z", "--at 'z' is not name=value, for example --at z=0.4."),
-        ("list mujco", "There is no case, engine or model 'mujco'. Did you mean 'mujoco'? Known: ball, ball_maze,"),
+        ("list mujco", "There is no case, engine, metric, suite or model 'mujco'. Did you mean 'mujoco'? Known are"),
+        ("list positon", "There is no case, engine, metric, suite or model 'positon'. Did you mean 'position'? Known are"),
     ],
 )  # fmt: skip
 def test_it_is_told(words: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:
