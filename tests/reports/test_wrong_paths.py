@@ -49,7 +49,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("run below", "The case 'below' is not a case file; its path must end in .py, .xml, .urdf."),
         ("run bouncing_ball.py", "There is no case file 'bouncing_ball.py'. Did you mean 'bouncing_ball'?"),
         ("run arm.xml --ctrl u.csv", "There is no table of controls 'u.csv'. Known: empty.csv."),
-        ("run apart/driven.xml --ctrl empty.csv", "Controls empty.csv: No columns to parse from file; valid: a table with "),
+        ("run apart/driven.xml --ctrl empty.csv", "Controls empty.csv: No columns to parse from file; valid: a table"),
         ("run arm.xml --control pid.py:Pid --tick 1", "There is no controller file 'pid.py'; there is no other *.py"),
         ("analyse delta_impulse --at z", "--at 'z' is not name=value, for example --at z=0.4."),
         ("list mujco", "There is no case, engine, metric, suite or model 'mujco'. Did you mean 'mujoco'? Known are"),

@@ -162,21 +162,23 @@ const crossbody = (() => {
   const fit = (table) => {
     const [box, matrix] = [table.closest(".scroll"), table.matches(".matrix")];
     const heads = matrix ? [...table.querySelectorAll("[data-heads] th")] : [...table.tHead.rows[0].cells].slice(1);
-    const wide = () => table.scrollWidth > box.clientWidth + 1;
-    const fold = (head, yes) => [head, ...cells(table, heads.indexOf(head) + 1)].forEach((each) => each.classList.toggle("folded", yes));
-    heads.forEach((head) => fold(head, false));
-    if (matrix) columns(table);
-    if (!box.clientWidth || "whole" in box.dataset) return heads.length;
-    const dear = (head) => matrix && cells(table, heads.indexOf(head) + 1).some((cell) => cell.matches(BEYOND));
-    const last = [...heads].reverse().filter((head) => !head.hidden).sort((a, b) => dear(a) - dear(b));
-    let left = last.length;
-    for (const head of last) {
-      if (left === 1 || !wide()) break;
-      fold(head, true);
-      left -= 1;
+    const own = new Map(heads.map((head, i) => [head, [head, ...cells(table, i + 1)]]));
+    const fold = (some) => {
+      own.forEach((each, head) => each.forEach((cell) => cell.classList.toggle("folded", some.includes(head))));
       if (matrix) columns(table);
+    };
+    fold([]);
+    if (!box.clientWidth || "whole" in box.dataset) return;
+    const dear = (head) => matrix && own.get(head).some((cell) => cell.matches(BEYOND));
+    const last = [...heads].reverse().filter((head) => !head.hidden).sort((a, b) => dear(a) - dear(b));
+    let [fewest, most] = [0, last.length - 1]; // by bisection: to lay out a large table takes a while
+    while (fewest < most) {
+      const middle = Math.floor((fewest + most) / 2);
+      fold(last.slice(0, middle));
+      if (table.scrollWidth > box.clientWidth + 1) fewest = middle + 1;
+      else most = middle;
     }
-    return left;
+    fold(last.slice(0, most));
   };
   const FITTED = ".scroll > table:is(.matrix, details.table table)";
   crossbody.each(FITTED, (table) => {
@@ -195,7 +197,12 @@ const crossbody = (() => {
     });
     box.after(button);
     crossbody.on("engines", again);
-    new ResizeObserver(again).observe(box);
+    let seen = -1; // the width for which it is fitted: what is folded changes heights
+    new ResizeObserver(() => {
+      const width = box.parentElement.clientWidth;
+      if (width !== seen) again();
+      seen = width;
+    }).observe(box.parentElement);
     box.closest("details")?.addEventListener("toggle", again);
   });
   const rows = (row) => { row.hidden = !crossbody.shown(row.dataset.engine.replace(/:$/, "")); };
