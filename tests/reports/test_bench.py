@@ -533,3 +533,15 @@ def test_one_run_has_no_spread() -> None:
     rows = bench(case, [Pick(engine="reference", profile="compiled")], Effort(repeats=1, every=4))
     assert set(rows["repeats"]) == {1}
     assert rows["iqr_ms"].isna().all()
+
+
+def test_an_engine_s_own_loop_is_drawn_below_its_run() -> None:
+    ladder = table(("reference", 1e-6, 1e-6, 1.0), ("mujoco", 1e-3, 1e-2, 40.0), ("mujoco", 5e-4, 5e-3, 80.0))
+    rows = ladder.assign(
+        iqr_ms=0.0, native_ms=np.where(ladder["engine"] == "mujoco", 0.1 * ladder["median_ms"], np.nan)
+    )
+    drawn = {line["name"]: line for line in work_precision(rows)["data"]}
+    assert list(numbers(drawn["mujoco:matched, its own loop"]["y"])) == [4.0, 8.0]
+    assert list(numbers(drawn["mujoco:matched"]["y"])) == [40.0, 80.0]
+    assert "reference:compiled, its own loop" not in drawn
+    assert len(work_precision(rows.assign(native_ms=np.nan))["data"]) == 2
