@@ -158,7 +158,9 @@ def one(name: str) -> Named:
     if "." not in name and head not in known:
         if summaries:
             return summaries
-        raise cases.UnknownName("case, engine or model", head, known)
+        raise cases.UnknownName(
+            "case, engine, metric, suite or model", head, {*known, *metrics.names(), *suites.names()}
+        )
     if head in engines.names():
         return engine(name)
     if name in models.names():

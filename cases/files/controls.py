@@ -30,10 +30,10 @@ def read_controls(path: Path, scene: Scene) -> Inputs:
     A CSV or Parquet table has a head, an NPZ t (m,) and ctrl (m, nu).
     """
     names = [actuator.name for actuator in scene.actuators]
-    if not names:
-        raise InvalidValue(f"Controls {path}: this file has no actuators that could take them (ctrl).")
     if not path.is_file():
         raise NoFile("table of controls", path)
+    if not names:
+        raise InvalidValue(f"Controls {path}: the robot has no actuators, which alone take controls.")
     try:
         open_regular(path).close()
         times, values = _from_npz(path) if path.suffix == ".npz" else _from_table(path, names)

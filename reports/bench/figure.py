@@ -14,6 +14,7 @@ from crossbody.reports.figures.styles import Panels, look
 FLOOR = 1e-16  # least error that is drawn
 LABEL = 11  # height of the name of a rung, pixels
 CROSS = "a cross is a run that ended early or touches more or less often than the truth"
+OWN = "open circles are an engine's own loop over the same steps, without Python"
 MOST = 8
 """Names that fit side by side on a narrow screen; the distance of two is this part of the decades of all errors."""
 
@@ -21,7 +22,8 @@ MOST = 8
 def work_precision(rows: pd.DataFrame) -> Figure:
     """Log-log lines labelled with tolerance or step; a run without a finite error is a cross at the right edge."""
     cases = ", ".join(rows["case"].unique())
-    panels = Panels(f"Work against precision, {cases}; {CROSS}", 560)
+    own = "native_ms" in rows and np.isfinite(rows["native_ms"].astype(float)).any()
+    panels = Panels("; ".join([f"Work against precision, {cases}", CROSS, *([OWN] if own else [])]), 560)
     error = rows["error"].astype(float)
     finite = error[np.isfinite(error) & (error > 0.0)]
     decades = np.ptp(np.log10(finite.clip(lower=FLOOR))) if len(finite) else 0.0
@@ -35,6 +37,8 @@ def work_precision(rows: pd.DataFrame) -> Figure:
         reached = np.isfinite(x)
         if reached.any():
             _add(panels, group[reached], x[reached].clip(lower=FLOOR), told | _line(group[reached], look(who), apart))
+        if own and np.isfinite(group[reached]["native_ms"].astype(float)).any():
+            _alone(panels, group[reached], x[reached].clip(lower=FLOOR), label, look(who))
         if not reached.all():  # no line leads there: nobody knows how far off they are
             marks = {"mode": "markers", "marker": {"symbol": "x", "size": 8, "color": look(who)["color"]}}
             _add(
@@ -62,6 +66,16 @@ def _add(panels: Panels, group: pd.DataFrame, x: pd.Series, more: dict[str, Any]
         x=x, y=group["median_ms"], customdata=group["setting"],
         hovertemplate="%{customdata:.0e}: error %{x:.2g}, %{y:.3g} ms",
         error_y={"type": "data", "array": group["iqr_ms"] / 2, "thickness": 1}, **more,
+    )  # fmt: skip
+
+
+def _alone(panels: Panels, group: pd.DataFrame, x: pd.Series, label: str, style: dict[str, Any]) -> None:
+    """Draw how long an engine's own loop takes at the same settings, thin and below its run."""
+    panels.add(
+        x=x, y=group["native_ms"].astype(float), customdata=group["setting"], name=f"{label}, its own loop",
+        hovertemplate="%{customdata:.0e}: error %{x:.2g}, %{y:.3g} ms", legendgroup=label, showlegend=False,
+        mode="lines+markers", line={"color": style["color"], "dash": "dot", "width": 1},
+        marker={"symbol": "circle-open", "size": 8},
     )  # fmt: skip
 
 

@@ -63,7 +63,10 @@ def _orders() -> Iterator[Asked]:
     floored = np.maximum(3e4 * h**3, 5e-6)
     (row,) = orders(_timed("e", h, floored, h)).to_dict(orient="records")
     yield "order", "errors of the order 3 above a floor", row["order"], 3.0
-    for off, said in (([1e-3, 1e-4], "too few points above rounding"), ([1e-12] * 5, "exact at every setting")):
+    for off, said in (
+        ([1e-3, 1e-4], "fewer than three runs have a finite error above rounding"),
+        ([1e-12] * 5, "exact at every setting"),
+    ):
         (row,) = orders(_timed("e", h[: len(off)], off, 1.0)).to_dict(orient="records")
         yield "what is said", said, float(row["says"] == said), 1.0
 

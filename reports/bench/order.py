@@ -91,7 +91,7 @@ def _known(rows: pd.DataFrame) -> float:
 def says(order: float, promised: float) -> str:
     """What an observed order says beside the promised one (NaN where nothing is promised)."""
     if math.isnan(order):
-        return "too few points above rounding"
+        return "fewer than three runs have a finite error above rounding"
     if order <= CONVERGES:
         return "does not converge to the truth of the case"
     if order < promised - SLACK:

@@ -73,10 +73,10 @@ def show_code(rows: Sequence[Row], code: int) -> None:
     """Print, where numbers are off that do not count as wrong, that the exit code does not tell of them."""
     known, loose = sum(row["verdict"] == Word.EXPECTED for row in rows), sum(map(beyond, rows))
     told = [
-        f"{count} {what}" for count, what in ((known, Word.EXPECTED), (loose, "beyond a limit, not judged")) if count
+        f"{count} {what}" for count, what in ((known, Word.EXPECTED), (loose, "beyond a limit but not judged")) if count
     ]
     if code == 0 and told:
-        click.echo(layout.told(f"Exit code 0: nothing is outside. It does not count numbers {' and '.join(told)}."))
+        click.echo(layout.told(f"Exit code 0: nothing is outside. It does not tell of the {' and '.join(told)}."))
 
 
 def _relative(runs: Sequence[EngineRun]) -> bool:

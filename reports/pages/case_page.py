@@ -40,15 +40,14 @@ NAMED = 6
 """Numbers that a reason names."""
 PLOTTED = 800_000  # room for all plots of a page, bytes; the samples of each line follow from it
 RUNS = columns(
-    called="Engine", outcome="Outcome", steps=("Steps", Kind.NUMBER), events=("Transitions", Kind.NUMBER),
-    wall_ms=("Run time [ms]", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
+    called="Engine", outcome="Outcome", wall_ms=("Run time [ms]", Kind.NUMBER), steps=("Steps", Kind.NUMBER),
+    events=("Transitions", Kind.NUMBER), control_ms=("In the controller [ms]", Kind.NUMBER),
     samples=("Samples stored", Kind.NUMBER),
     settings=("Settings", Kind.LONG),
 )  # fmt: skip
 AUDIT = columns(
-    who="Engine", quantity="Quantity", reference="Reference", value="Engine's",
-    difference=("Difference", Kind.NUMBER), tolerance=("Allowed", Kind.NUMBER),
-    verdict=("Same", Kind.VERDICT),
+    who="Engine", quantity="Quantity", verdict=("Same", Kind.VERDICT), difference=("Difference", Kind.NUMBER),
+    tolerance=("Allowed", Kind.NUMBER), reference="Reference", value="Engine's",
 )  # fmt: skip
 AUDIT_TEXT = (
     "Before motions are compared, every engine must have the same physics: the mass matrix M, the bias forces, the "

@@ -31,16 +31,15 @@ BENCH = (
     "the reference that is at least as accurate, median over the timed cases."
 )
 COLUMNS = columns(
-    who="Engine", worst=("Worst", Kind.VERDICT), within=("Cases trusted", Kind.NUMBER),
-    expected=("Cases expected-outside", Kind.NUMBER),
+    who="Engine", worst=("Worst", Kind.VERDICT), most=("Error, worst", Kind.NUMBER),
+    cost=("Run time over the reference's, median", Kind.NUMBER), within=("Cases trusted", Kind.NUMBER),
     beyond=("Cases beyond a limit, not judged", Kind.NUMBER), outside=("Cases outside", Kind.NUMBER),
-    skipped=("Cases not run", Kind.NUMBER), error=("Error, median", Kind.NUMBER),
-    most=("Error, worst", Kind.NUMBER), cost=("Run time over the reference's, median", Kind.NUMBER),
-    ratio=("At its best error", Kind.NUMBER),
+    expected=("Cases expected-outside", Kind.NUMBER), skipped=("Cases not run", Kind.NUMBER),
+    error=("Error, median", Kind.NUMBER), ratio=("At its best error", Kind.NUMBER),
 )  # fmt: skip
 KNOWN = columns(
-    who="Engine", why=("Known properties", Kind.LONG), metrics="Metrics", cases=("Cases", Kind.NUMBER),
-    rows=("Rows", Kind.NUMBER), most=("Farthest [limits]", Kind.NUMBER), where="On",
+    who="Engine", most=("Farthest [limits]", Kind.NUMBER), why=("Known properties", Kind.LONG), where="On",
+    cases=("Cases", Kind.NUMBER), rows=("Rows", Kind.NUMBER), metrics="Metrics",
 )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from crossbody.cases.errors import several
 from crossbody.reports.figures.section import Column, Kind, Plot, Section, Table, columns, records
 from crossbody.reports.layout import unit_text
 from crossbody.reports.runs.study import read_json
@@ -112,7 +113,8 @@ def summary(estimates: pd.DataFrame, held: pd.DataFrame, fitted: int, left: int)
         f"{row['name']} = {row['value']:.5g} ± {(row['high'] - row['low']) / 2.0:.1g}{unit_text(str(row['unit']))}"
         for row in known
     ]
-    text = f"{len(known)} of {len(rows)} parameters are identified{': ' * bool(values)}{', '.join(values)}"
+    of = f"{len(known)} of {several(len(rows), 'parameter')} {'is' if len(rows) == 1 else 'are'} identified"
+    text = f"{of}{': ' * bool(values)}{', '.join(values)}"
     text += f"; not {', '.join(str(row['name']) for row in lost)}." if lost else "."
     if not left:
         return f"{text} No window of {fitted} was left out of the fit: nothing shows whether it holds on others."

@@ -22,8 +22,9 @@ TEXT = (
     "deviations of the measurement noise; windows held out of an identification are shaded."
 )
 METRICS = columns(
-    who="Engine", metric="Metric", means=("Meaning", Kind.LONG), channel="Channel",
-    value=("Value", Kind.NUMBER), unit="Unit", valid="Valid", verdict=("Verdict", Kind.VERDICT),
+    who="Engine", metric="Metric", channel="Channel",
+    value=("Value", Kind.NUMBER), unit="Unit", verdict=("Verdict", Kind.VERDICT),
+    means=("Meaning", Kind.LONG), valid="Valid",
 )  # fmt: skip
 JUDGED = ("outside", "crashed", "within")
 """Words of verdicts, the worst first."""

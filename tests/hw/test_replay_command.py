@@ -301,7 +301,7 @@ def test_an_identification_that_is_stopped_is_told_and_outside(
     told = json.loads(capsys.readouterr().out)
     assert [row["identifiable"] for row in told["identify"]] == [False]
     assert "Stopped at the time limit of 1e-06 s" in told["warnings"][0]["text"]
-    assert "0 of 1 parameters are identified; not k1." in (tmp_path / "out" / "index.html").read_text()
+    assert "0 of 1 parameter is identified; not k1." in (tmp_path / "out" / "index.html").read_text()
 
 
 def test_a_replay_may_take_the_seconds_that_are_asked_for_and_an_identification_is_given_them(

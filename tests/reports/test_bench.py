@@ -131,7 +131,7 @@ def test_orders_are_held_against_promises(rows: pd.DataFrame) -> None:
     assert orders.loc["second", "order"] == pytest.approx(2.0, abs=1e-3)
     assert orders.loc["second", "says"] == "converges"
     assert orders.loc["liar", "says"] == "converges, but not with the promised order 4"
-    assert orders.loc["fails", "says"] == "too few points above rounding"
+    assert orders.loc["fails", "says"] == "fewer than three runs have a finite error above rounding"
     assert orders.loc["compiled", "says"] == "exact at every setting"
 
 
@@ -196,7 +196,12 @@ def test_every_engine_declares_what_it_promises() -> None:
 
 @pytest.mark.parametrize(
     ("order", "promised", "words"),
-    [(np.nan, 1.0, "too few"), (0.2, 1.0, "does not converge"), (3.9, 4.0, "converges"), (1.0, np.nan, "converges")],
+    [
+        (np.nan, 1.0, "fewer than three"),
+        (0.2, 1.0, "does not converge"),
+        (3.9, 4.0, "converges"),
+        (1.0, np.nan, "converges"),
+    ],
 )
 def test_what_an_order_says(order: float, promised: float, words: str) -> None:
     assert says(order, promised).startswith(words)
@@ -528,3 +533,15 @@ def test_one_run_has_no_spread() -> None:
     rows = bench(case, [Pick(engine="reference", profile="compiled")], Effort(repeats=1, every=4))
     assert set(rows["repeats"]) == {1}
     assert rows["iqr_ms"].isna().all()
+
+
+def test_an_engine_s_own_loop_is_drawn_below_its_run() -> None:
+    ladder = table(("reference", 1e-6, 1e-6, 1.0), ("mujoco", 1e-3, 1e-2, 40.0), ("mujoco", 5e-4, 5e-3, 80.0))
+    rows = ladder.assign(
+        iqr_ms=0.0, native_ms=np.where(ladder["engine"] == "mujoco", 0.1 * ladder["median_ms"], np.nan)
+    )
+    drawn = {line["name"]: line for line in work_precision(rows)["data"]}
+    assert list(numbers(drawn["mujoco:matched, its own loop"]["y"])) == [4.0, 8.0]
+    assert list(numbers(drawn["mujoco:matched"]["y"])) == [40.0, 80.0]
+    assert "reference:compiled, its own loop" not in drawn
+    assert len(work_precision(rows.assign(native_ms=np.nan))["data"]) == 2

@@ -452,6 +452,35 @@ def test_a_table_is_saved_with_all_digits(out: Path, browser: chromium.Browser) 
     assert any(len(line.split(",")[3]) > 12 for line in lines)
 
 
+def test_columns_that_do_not_fit_are_folded_and_stay_in_what_is_saved(out: Path, browser: chromium.Browser) -> None:
+    browser.open(out / CASE)
+    table = "[...document.querySelectorAll('table[data-csv$=Runs]')][0]"
+    heads = f"[...{table}.tHead.rows[0].cells]"
+    shown, more = (
+        f"{heads}.filter((head) => head.offsetWidth).length",
+        f"{table}.closest('.scroll').nextElementSibling.nextElementSibling",
+    )
+    every = browser.js(f"{heads}.length")
+    assert browser.js(shown) == every
+    assert browser.js(f"{more}.hidden")
+    browser.open(out / CASE, width=250)
+    browser.wait(f"{shown} < {every}")
+    left = browser.js(shown)
+    assert left > 1
+    assert browser.js(f"{more}.textContent") == f"{every - left} more column{'s' * (every - left > 1)}"
+    browser.js(
+        "URL.createObjectURL = (blob) => { blob.text().then((text) => { window.saved = text; }); return 'blob:x'; };"
+        f"HTMLAnchorElement.prototype.click = function () {{}}; {table}.closest('.scroll').nextElementSibling.click()"
+    )
+    browser.wait("window.saved")
+    assert len(browser.js("window.saved").splitlines()[0].split(",")) == every
+    browser.js(f"{more}.click()")
+    assert browser.js(shown) == every
+    assert browser.js(f"{more}.textContent") == "Fewer columns"
+    browser.js(f"{more}.click()")
+    assert browser.js(shown) == left
+
+
 def test_the_switch_turns_the_theme(out: Path, browser: chromium.Browser) -> None:
     browser.open(out / CASE, theme="light")
     paper = "getComputedStyle(document.body).backgroundColor"
@@ -506,8 +535,14 @@ CROSSED = """[...document.querySelectorAll('.plot')].flatMap((plot) => {
 
 HIDDEN = """[...document.querySelectorAll('table')].filter((table) => table.offsetWidth).flatMap((table) =>
     [...table.querySelectorAll('tr')].filter((row) => row.offsetHeight
-        && [...row.cells].some((cell) => cell.textContent.trim() && !cell.offsetWidth)).map(() => table.className))"""
+        && [...row.cells].some((cell) => cell.textContent.trim() && !cell.offsetWidth && !cell.matches('.folded')))
+        .map(() => table.className))"""
 """Tables with a row that is seen and a cell in it that is not."""
+
+SIDEWAYS = """[...document.querySelectorAll('.scroll')].filter((box) => box.scrollWidth > box.clientWidth + 1
+    && box.clientWidth && box.querySelector('table:is(.matrix, .verdicts, details.table table)')
+    ).map((box) => box.getAttribute('aria-label'))"""
+"""Tables that are wider than their place."""
 
 
 def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[str]:
@@ -518,6 +553,8 @@ def look(browser: chromium.Browser, page: Path, width: int, theme: str) -> list[
     if not browser.js("document.documentElement.scrollWidth <= innerWidth"):
         found.append("wider than the window")
     found += [f"{name}: titles over ticks" for name in browser.js(CROSSED)]
+    browser.js("document.querySelectorAll('details.table').forEach((each) => { each.open = true; })")
+    browser.wait(f"!{SIDEWAYS}.length", 5.0)
     found += [f"{name}: a cell without room" for name in browser.js(HIDDEN) if width > 600]
     if AXE is None or AXE.origin is None or width != 1400:
         return found

@@ -15,6 +15,7 @@ from crossbody.cases import UnknownName
 from crossbody.cases.errors import NoFile
 from crossbody.reports.cli import main
 
+MOTOR = '<actuator><motor name="m" joint="arm"/></actuator></mujoco>'
 LISTED = "from crossbody.reports.cli import main; main(['list'])"
 THERE = "Did you mean 'arm.xml'? Known: arm.xml, hand.xml."
 
@@ -24,6 +25,8 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("arm.xml", "hand.xml", "arm.txt", "arm.mjcf", "ARM.XML"):
         Path(name).write_text(ARM)
+    Path("apart").mkdir()
+    Path("apart", "driven.xml").write_text(ARM.replace("</mujoco>", MOTOR))
     Path("empty.csv").touch()
     Path("folder.xml").mkdir()
     Path("below").mkdir()
@@ -46,10 +49,11 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("run below", "The case 'below' is not a case file; its path must end in .py, .xml, .urdf."),
         ("run bouncing_ball.py", "There is no case file 'bouncing_ball.py'. Did you mean 'bouncing_ball'?"),
         ("run arm.xml --ctrl u.csv", "There is no table of controls 'u.csv'. Known: empty.csv."),
-        ("run arm.xml --ctrl empty.csv", "Controls empty.csv: No columns to parse from file; valid: a table with "),
+        ("run apart/driven.xml --ctrl empty.csv", "Controls empty.csv: No columns to parse from file; valid: a table"),
         ("run arm.xml --control pid.py:Pid --tick 1", "There is no controller file 'pid.py'; there is no other *.py"),
         ("analyse delta_impulse --at z", "--at 'z' is not name=value, for example --at z=0.4."),
-        ("list mujco", "There is no case, engine or model 'mujco'. Did you mean 'mujoco'? Known: ball, ball_maze,"),
+        ("list mujco", "There is no case, engine, metric, suite or model 'mujco'. Did you mean 'mujoco'? Known are"),
+        ("list positon", "There is no case, engine, metric, suite or model 'positon'. Did you mean 'position'? Known"),
     ],
 )  # fmt: skip
 def test_it_is_told(words: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -151,13 +151,60 @@ const crossbody = (() => {
     });
     table.querySelectorAll('th[scope="colgroup"]').forEach((group) => {
       group.dataset.span ||= group.colSpan;
-      const left = heads.splice(0, group.dataset.span).filter((head) => !head.hidden).length;
+      const left = heads.splice(0, group.dataset.span).filter((head) => !head.hidden && !head.classList.contains("folded")).length;
       group.hidden = !left;
       group.colSpan = left || 1;
     });
   };
-  crossbody.each(".matrix", columns);
-  crossbody.on("engines", () => document.querySelectorAll(".matrix").forEach(columns));
+  // Columns that do not fit are folded, the last ones first; of a matrix those with nothing beyond a limit before others.
+  const BEYOND = ".outside, .expected-outside, .beyond-not-judged, .crashed";
+  const cells = (table, i) => [...table.tBodies[0].rows].map((row) => row.cells[i]).filter(Boolean);
+  const fit = (table) => {
+    const [box, matrix] = [table.closest(".scroll"), table.matches(".matrix")];
+    const heads = matrix ? [...table.querySelectorAll("[data-heads] th")] : [...table.tHead.rows[0].cells].slice(1);
+    const own = new Map(heads.map((head, i) => [head, [head, ...cells(table, i + 1)]]));
+    const fold = (some) => {
+      own.forEach((each, head) => each.forEach((cell) => cell.classList.toggle("folded", some.includes(head))));
+      if (matrix) columns(table);
+    };
+    fold([]);
+    if (!box.clientWidth || "whole" in box.dataset) return;
+    const dear = (head) => matrix && own.get(head).some((cell) => cell.matches(BEYOND));
+    const last = [...heads].reverse().filter((head) => !head.hidden).sort((a, b) => dear(a) - dear(b));
+    let [fewest, most] = [0, last.length - 1]; // by bisection: to lay out a large table takes a while
+    while (fewest < most) {
+      const middle = Math.floor((fewest + most) / 2);
+      fold(last.slice(0, middle));
+      if (table.scrollWidth > box.clientWidth + 1) fewest = middle + 1;
+      else most = middle;
+    }
+    fold(last.slice(0, most));
+  };
+  const FITTED = ".scroll > table:is(.matrix, details.table table)";
+  crossbody.each(FITTED, (table) => {
+    const [box, button] = [table.closest(".scroll"), document.createElement("button")];
+    const again = () => {
+      const folded = (fit(table), table.querySelectorAll("thead .folded").length);
+      button.hidden = !folded && !("whole" in box.dataset);
+      button.textContent = folded ? `${folded} more column${folded > 1 ? "s" : ""}` : "Fewer columns";
+    };
+    button.type = "button";
+    button.className = "save";
+    button.addEventListener("click", () => {
+      if ("whole" in box.dataset) delete box.dataset.whole;
+      else box.dataset.whole = "";
+      again();
+    });
+    box.after(button);
+    crossbody.on("engines", again);
+    let seen = -1; // the width for which it is fitted: what is folded changes heights
+    new ResizeObserver(() => {
+      const width = box.parentElement.clientWidth;
+      if (width !== seen) again();
+      seen = width;
+    }).observe(box.parentElement);
+    box.closest("details")?.addEventListener("toggle", again);
+  });
   const rows = (row) => { row.hidden = !crossbody.shown(row.dataset.engine.replace(/:$/, "")); };
   const OWN = ":is(details.table tr, .causes li)[data-engine]";
   crossbody.each(OWN, rows);
