@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crossbody.cases.arrays import Floats, distinct
-from crossbody.cases.splines import integral, through
+from crossbody.cases.splines import integral, straight, through
 from crossbody.cases.trajectory import Trajectory
 
 CROSSINGS = 3
@@ -120,7 +120,7 @@ def _integral(t: Floats, values: Floats, times: Floats, smooth: bool) -> Floats:
     if smooth:
         return integral(t, values, times)
     sums = np.cumsum(0.5 * np.diff(t)[:, None] * (values[1:] + values[:-1]), axis=0)
-    return np.stack([np.interp(times, t, np.append(0.0, column)) for column in sums.T], axis=1)
+    return straight(t, np.concatenate([np.zeros((1, values.shape[1])), sums]), times)
 
 
 def _piece(t: Floats, values: Floats, smooth: bool) -> Callable[[Floats], Floats]:
@@ -132,8 +132,7 @@ def _piece(t: Floats, values: Floats, smooth: bool) -> Callable[[Floats], Floats
         if len(t) == 1:
             return np.repeat(values, len(times), axis=0)
         out = np.empty((len(times), values.shape[1]))
-        for k in np.flatnonzero(~finite):
-            out[:, k] = np.interp(times, t, values[:, k])
+        out[:, ~finite] = straight(t, values[:, ~finite], times)
         if curve is not None:
             out[:, finite] = curve(np.clip(times, t[0], t[-1]))
         return out

@@ -54,6 +54,14 @@ def integral(t: Floats, values: Floats, times: Floats) -> Floats:
     return whole[i] + upto((times - t[i])[:, None], i)
 
 
+def straight(t: Floats, values: Floats, times: Floats) -> Floats:
+    """Return values (m, k) at times (m,) by straight lines between samples (n, k); k may be 0."""
+    out = np.empty((len(times), values.shape[1]))
+    for k, column in enumerate(values.T):
+        out[:, k] = np.interp(times, t, column)
+    return out
+
+
 def _step(t: Floats, times: Floats) -> NDArray[np.intp]:
     """Return in which step times are (m,)."""
     return np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)

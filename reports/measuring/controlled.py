@@ -7,6 +7,7 @@ import numpy as np
 from crossbody.cases import Case, Inputs, Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.control import Control
+from crossbody.cases.splines import straight
 from crossbody.reference import System
 from crossbody.reports.measuring.cubics import coordinates
 from crossbody.reports.measuring.equations import equations, finite
@@ -35,7 +36,7 @@ def _asked(case: Case, system: System, run: Trajectory, given: Inputs | None) ->
         return given
     ticks: Floats = system.tick * np.arange(int(run.t[-1] / system.tick + 1e-9) + 1, dtype=np.float64)
     q = coordinates(run, ticks, case.quaternions)
-    v = np.stack([np.interp(ticks, run.t, column) for column in run.v.T], axis=1)
+    v = straight(run.t, run.v, ticks)
     known = np.zeros((len(ticks), system.inputs)) if given is None else given.at(ticks)
     u, memory, p = np.zeros(system.inputs), np.zeros(system.memory), np.array(system.p)
     values, before = np.zeros((len(ticks), system.inputs)), np.zeros(system.inputs)

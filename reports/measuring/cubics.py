@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Trajectory
 from crossbody.cases.arrays import Floats
 from crossbody.cases.rotations import rates
+from crossbody.cases.splines import straight
 
 
 def rates_of(run: Trajectory, quaternions: Sequence[int] = ()) -> Floats | None:
@@ -50,7 +51,7 @@ def coordinates(run: Trajectory, instants: Floats, quaternions: Sequence[int] = 
     if len(t) < 2:
         return np.repeat(q, len(instants), axis=0)
     if (v := rates_of(run, quaternions)) is None:
-        return np.stack([np.interp(instants, t, column) for column in q.T], axis=1)
+        return straight(t, q, instants)
     i = step_of(t, instants)
     h = (t[i + 1] - t[i])[:, None]
     x = np.clip(np.divide(instants[:, None] - t[i, None], h, out=np.ones_like(h), where=h > 0.0), 0.0, 1.0)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from crossbody.cases import Acts, Mode
 from crossbody.cases.arrays import Floats
 from crossbody.cases.between import integrals
+from crossbody.cases.splines import straight
 from crossbody.cases.trajectory import Event, Trajectory
 
 SAME = 1e-7  # part of the horizon within which a sample and a collision are at one instant
@@ -104,7 +105,7 @@ def integrated(whole: Trajectory, signal: Signal, times: Floats) -> Floats:
     values, along = signal(whole)
     if whole.acts == Acts.AT:
         return integrals(whole, values if along is None else values * along)(times)
-    return np.stack([np.interp(times, whole.t, one) for one in cumulated(whole, values, along).T], axis=1)
+    return straight(whole.t, cumulated(whole, values, along), times)
 
 
 def true_impulse(run: Trajectory, exact: Trajectory, whole: Trajectory) -> Floats:
