@@ -34,6 +34,10 @@ SLOW = 1e-3
 """Part of the fastest pole below which a modulus does not count as a scale; and part of the largest row."""
 
 
+NO_ACTIVATIONS = {
+    "verdict": Word.SKIPPED.value,
+    "why": "Activations are states of the reference's model, which the linear models of engines leave out.",
+}
 NO_FRICTION = {
     "verdict": Word.SKIPPED.value,
     "why": ("Friction is compared by motions: its law near zero slip has no derivative that could be compared "
@@ -55,6 +59,9 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
             continue
         for name in names:
             about = {"place": place.name, "engine": name}
+            if place.system.activations is not None:
+                rows.append({**about, **NO_ACTIVATIONS})
+                continue
             try:
                 ways = engines.load(name).linearise(place.case, place.spot)
             except CrossbodyError as error:

@@ -89,6 +89,8 @@ def _pressed(run: Trajectory, more: float) -> Trajectory:
 
 def _laws(plain: Plain, least: float) -> Iterator[Control]:
     """Put multipliers off the law, at all of a few samples and at one."""
+    if not len(plain.quiet):
+        return
     few = taken(plain.run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
     at = tuple(np.unravel_index(np.argmax(np.abs(few.lam)), few.lam.shape))
     if np.abs(few.lam[at]) < least:

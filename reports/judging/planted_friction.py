@@ -49,8 +49,8 @@ def unturned(case: Case, run: Trajectory) -> bool:
 
 def _cumulated(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
     """Draw a force along a tangent at every one of few samples, far apart: its impulse and work by trapezoids."""
-    system, run = equations(plain.case), taken(plain.run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
-    if system is None or not ways or not run.lam.any():
+    system, run = equations(plain.case), taken(plain.run, plain.quiet[:: max(1, -(-len(plain.quiet) // FEW))])
+    if len(run.t) < 2 or system is None or not ways or not run.lam.any():
         return
     row = ways[int(plain.draw.integers(len(ways)))].start
     force = float(np.max(np.abs(run.lam))) * plain.draw.uniform(-1.0, 1.0, len(run.t))

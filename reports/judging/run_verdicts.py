@@ -19,7 +19,7 @@ from crossbody.cases.arguments import instance
 from crossbody.cases.arrays import Floats
 from crossbody.cases.defaults import TOLERANCE, limits_of
 from crossbody.reports import metrics
-from crossbody.reports.judging.acting import misacting, uncertain
+from crossbody.reports.judging.acting import SUMS, misacting, uncertain
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.judging.clocks import Clock, mistimed
 from crossbody.reports.judging.parts import LARGEST, PARTS, SPLIT, Split, Study, part_of, splits
@@ -51,7 +51,7 @@ from crossbody.reports.judging.verdict import (
     limit_for,
     regression,
 )
-from crossbody.reports.measuring.truth import Truth, shortened
+from crossbody.reports.measuring.truth import Truth, before, shortened
 
 GROWING = frozenset({
     "position", "velocity", "gap_error", "event_times", "mode_times", "lam_impulse_path",
@@ -67,6 +67,8 @@ LOOSEST = 1e3
 """So many times the tolerance that limits are for widen them at most: beyond, an error may be as large as a fault's."""
 EXACT = IDENTITIES - GROWING
 """Metrics of a run against itself: neither a tolerance nor a horizon widens their limits."""
+MAY_BE_UNTOLD = frozenset({"rate_residual", *SUMS})
+"""Metrics that samples which are far apart do not tell."""
 TINY = 1e-300
 """In place of a tolerance of an audit that is zero: any difference is beyond it."""
 SUM = 1e-9
@@ -177,7 +179,7 @@ class Judge:
         if found is None or metric in EXACT:
             return found
         found = found.under(self.entry.settings)
-        if metric in self.untold:
+        if metric in MAY_BE_UNTOLD and metric in self.untold:
             return None
         grows, longer, looser = self.truth.grows, self.longer, min(self.looser, LOOSEST)
         times, why = longer * looser, found.why
@@ -311,7 +313,7 @@ def _outside_of_momenta(judge_: Judge, run: Trajectory) -> Iterator[Verdict]:
     """Say that forces did not act when the run says."""
     try:
         with np.errstate(all="ignore"):  # a run that failed may end where squares overflow
-            found = list(misacting(judge_.case, judge_.entry.settings, run))
+            found = list(misacting(judge_.case, judge_.entry.settings, before(run, judge_.truth.trusted)))
     except np.linalg.LinAlgError:  # where masses vanish nothing tells what forces did
         return
     for value, why in found:

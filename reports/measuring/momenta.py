@@ -113,6 +113,9 @@ def _steps(run: Trajectory, case: Case, inputs: Inputs | None) -> tuple[NDArray[
     dt = np.diff(run.t)
     changes = np.linalg.norm(np.diff(run.lam, axis=0), axis=1) * dt
     changes[dt <= SHORT * dt.max()] = 0.0
+    if run.acts == Acts.AT:  # what a stiff law takes back within a step is between its samples
+        late = dt[:, None] * np.maximum(case.law.a1, np.sqrt(case.law.a0)) > 1.0
+        changes[(late & (np.diff(run.lam, axis=0) != 0.0)).any(axis=1)] = 0.0
     if run.acts in (Acts.AT, Acts.GRID):  # friction of a slip that dies out may turn within nanoseconds
         stops = stopping(run)
         changes[stops[:-1] | stops[1:]] = 0.0

@@ -117,6 +117,7 @@ def _rates_of_joints(own: Floats, leads: Floats, exact: Trajectory, case: Case, 
     places, rates = (np.array([WIDTHS[joint.type][k] for joint in scene.joints], dtype=int) for k in (0, 1))
     kinds = np.array([joint.type for joint in scene.joints])
     joints = of_like(np.where(np.repeat(kinds == "free", rates), 0.0, own), case.velocities)
+    joints = np.maximum(joints, least(case.velocities, rates=True))  # what the case says of its rates
     most = np.where(joints > RESTS, joints, np.maximum(joints, leads))
     starts = np.cumsum(rates) - rates
     turned = np.abs(exact.q).max(axis=0)[(np.cumsum(places) - places)[kinds == "hinge"]]

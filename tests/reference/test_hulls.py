@@ -384,8 +384,8 @@ COLLADA = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11
     [(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "3 corners that lie in one plane"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 1e-9)), "4 corners that lie in one plane"),
      (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.inf)), "must be finite"),
-     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.nan)), "corner 3 is .* must be 3 numbers"),
-     (((0.0, 0.0), (1.0, 0.0)), "corner 0 is .* must be 3 numbers"), ((), "only a hull has any")],
+     (((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, np.nan)), "point 3 is .* must be 3 numbers"),
+     (((0.0, 0.0), (1.0, 0.0)), "point 0 is .* must be 3 numbers"), ((), "only a hull has any")],
 )  # fmt: skip
 def test_a_hull_that_is_none_is_refused(corners: Any, told: str) -> None:
     with pytest.raises(SceneError, match=told):
