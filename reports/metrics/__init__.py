@@ -50,6 +50,11 @@ def names() -> tuple[str, ...]:
     return tuple(sorted({*_REGISTRY.names(), *_together()}))
 
 
+def own() -> frozenset[str]:
+    """Names of those that are crossbody's own; imports none of them."""
+    return frozenset({*_REGISTRY.own(), *_together()})
+
+
 def summary(name: str) -> str:
     """What a metric measures, in one line; imports nothing."""
     return _together()[name][1] if name in _together() else _REGISTRY.summary(name)

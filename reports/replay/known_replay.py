@@ -138,11 +138,11 @@ def _torque(t: Floats) -> Floats:
 
 
 def read(text: str, columns: str, repair: tuple[str, ...] = ()) -> Log:
-    """Return a log that was written as text."""
+    """Return a log that was written as text, whatever formats of others say of such a file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
         path.write_text(text, encoding="utf-8")
-        return hw.read(path, parse_columns(columns), repair=repair)
+        return hw.read(path, parse_columns(f'format = "csv"\n{columns}'), repair=repair)
 
 
 @cache
