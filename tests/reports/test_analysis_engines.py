@@ -85,6 +85,19 @@ def test_derivatives_of_pinocchio_err_as_the_force_on_the_loops():
     assert unloaded < work.SLOPE
 
 
+@pytest.mark.parametrize("dynamics", ["filter", "integrator"])
+def test_activations_are_said_to_be_left_out_by_engines(dynamics, tmp_path):
+    (tmp_path / "lag.xml").write_text(
+        f"""<mujoco><worldbody><body pos="0 0 1"><joint name="j" axis="0 1 0" damping=".2"/>
+        <inertial pos="0 0 -.3" mass="1" diaginertia=".01 .01 .01"/></body></worldbody>
+        <actuator><general joint="j" dyntype="{dynamics}" dynprm=".05" gainprm="2"/></actuator></mujoco>"""
+    )
+    rows, _ = work.counterparts(places(cases.from_file(str(tmp_path / "lag.xml"))))
+    assert set(rows["engine"]) == set(work.ENGINES)
+    assert set(rows["verdict"]) == {"skipped"}
+    assert rows["why"].str.contains("Activations").all()
+
+
 def test_a_wrong_engine_is_outside(monkeypatch, capsys):
     known.check("analyse")  # of the engines as they are
     load = engines.load
