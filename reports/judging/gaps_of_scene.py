@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from crossbody.reference import System
 
 BESIDE, TOUCHING, NEAR, SEED = 12, 24, 0.3, 20250311
-"""States beside the start, and those at which pairs come near; how far the first are from the start; of what is drawn."""
+"""States beside the start, and those at which pairs come near; how far the first are off it; of what is drawn."""
 CLOSE, PULLS, LEAP, TINY = 0.01, 3, 0.5, 1e-12
-"""Gap up to which pairs come near, m; in how many steps, how long one is at most, m or rad, and least |H|^2 that moves."""
+"""Gap up to which pairs come near, m; in how many steps, how long each is at most, and the least |H|^2 that moves."""
 MOST = 8  # pairs that are looked at
 EXACT = 1e-9
 """Part of the lengths in a scene by which gaps in another order of sums differ; near parallels roots lose digits."""

@@ -25,8 +25,8 @@ from crossbody.reports.judging.comparison import check_names, judges_parts
 from crossbody.reports.judging.covered import followed_if_covered, refuse_uncovered
 from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.forces_of_scene import forces_of_scene
-from crossbody.reports.judging.gaps_of_scene import gaps_of_scene
 from crossbody.reports.judging.form_of_case import form_of_case
+from crossbody.reports.judging.gaps_of_scene import gaps_of_scene
 from crossbody.reports.judging.reach import BUDGET, estimated
 from crossbody.reports.judging.run_verdicts import Entry, crash
 from crossbody.reports.judging.steps_taken import runaway
