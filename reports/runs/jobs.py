@@ -26,6 +26,7 @@ from crossbody.reports.judging.covered import followed_if_covered, refuse_uncove
 from crossbody.reports.judging.first_steps import first_steps
 from crossbody.reports.judging.forces_of_scene import forces_of_scene
 from crossbody.reports.judging.form_of_case import form_of_case
+from crossbody.reports.judging.gaps_of_scene import gaps_of_scene
 from crossbody.reports.judging.reach import BUDGET, estimated
 from crossbody.reports.judging.run_verdicts import Entry, crash
 from crossbody.reports.judging.steps_taken import runaway
@@ -228,7 +229,7 @@ def _ran(
     rows: tuple[AuditRow, ...] = audit(shown, reference, case, hidden) if reference else ()
     own = {name: value for name, value in asked.items() if name in prepared.settings}
     rows += settings_kept(shown, prepared.settings)
-    rows += (*forces_of_scene(case), *form_of_case(case), *units_of_scene(case))
+    rows += (*forces_of_scene(case), *gaps_of_scene(case), *form_of_case(case), *units_of_scene(case))
     if case.file:
         from crossbody.reports.judging.start_of_file import start_of_file  # parsers that other cases do without
 

@@ -112,7 +112,7 @@ def _arrows(scene: Scene, q: Floats, lam: Floats) -> Iterator[Floats]:
     met = contacts(scene)
     rub = row + sum(contact.places for contact in met)
     for contact in met:
-        _, normals, points = _meeting(contact, bodies)
+        _, normals, points = meeting(contact, bodies)
         pushing = lam[:, row : row + contact.places]
         force = pushing[:, :, None] * np.nan_to_num(normals)
         row += contact.places
@@ -144,7 +144,7 @@ def _turns(contact: Contact, bodies: Mapping[str, Pose]) -> tuple[Floats, Floats
     return at, by
 
 
-def _meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
+def meeting(contact: Contact, bodies: Mapping[str, Pose]) -> Places:
     """Return where two shapes would meet (n, places), by the poses of the bodies at n instants."""
     shapes = (contact.first, contact.second)
     stand = [placed(bodies[shape.body], shape.position, shape.orientation) for shape in shapes]
@@ -161,7 +161,7 @@ def slip(scene: Scene, contact: Contact, place: int, q: Floats, v: Floats) -> Fl
     """
     owners = [shape.body for shape in (contact.first, contact.second)]
     now, turns = body_poses(scene, q), matrices(np.asarray(contact.first.orientation))
-    at = _meeting(contact, now)[2][:, place]
+    at = meeting(contact, now)[2][:, place]
     inside = [np.einsum("nij,ni->nj", now[body][1], at - now[body][0]) for body in owners]
     rate = rates(q, v, quaternions(scene))
     ends = [body_poses(scene, q + side * SHORT * rate) for side in (-1.0, 1.0)]
