@@ -16,6 +16,7 @@ import numpy as np
 from crossbody.cases import Case, CaseUnsupported, Mode, Parameter, SceneError
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.cases.files import mjcf
+from crossbody.cases.files.case import OF_THE_FILE
 from crossbody.cases.files.without import strip
 from crossbody.cases.scene import UNBOUNDED, Scene, Tendon
 from crossbody.cases.scene_contacts import frictional, rough, rows_of, under_law
@@ -91,6 +92,8 @@ def why_not(case: Case, profile: str) -> str | None:
         return None
     if not case.file:
         return "There is no file to run unchanged; for MuJoCo's own contacts, use the profile default."
+    if any(float(case.parameters.get(name, OF_THE_FILE)) != OF_THE_FILE for name in ("a0", "a1")):
+        return "The profile as_is follows the file's constants, not those of --law; the profile matched follows these."
     try:
         _from_file(case)
     except SceneError as error:

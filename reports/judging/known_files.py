@@ -54,6 +54,12 @@ URDF = """<robot name="known"><link name="base"/>
 <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0.1 1" rpy=".2 -.4 .9"/>
 <axis xyz="0 1 0"/><limit lower="-1" upper="2" effort="50" velocity="9"/>
 <dynamics damping=".05" friction="0.2"/></joint></robot>"""
+FLOATS = """<robot name="known"><link name="base"/><link name="stand"/><link name="ship"><inertial><mass value="1"/>
+<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<joint name="stands" type="fixed"><parent link="base"/><child link="stand"/>
+<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/></joint>
+<joint name="floats" type="floating"><parent link="stand"/><child link="ship"/>
+<origin xyz=".5 0 .25" rpy="0 .6 0"/></joint></robot>"""
 STARTS = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0"/><geom size=".1"/></body></worldbody>
 <actuator><motor joint="rail"/></actuator>
 <keyframe><key name="one" qpos=".3" qvel="-2" ctrl=".7"/></keyframe></mujoco>"""
@@ -65,7 +71,7 @@ Asked = tuple[str, Any, Any]
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what was read, as it is, least and most, and of which file; nothing where no compiler is installed."""
-    return unlike_read(_mjcf, _urdf, _start)
+    return unlike_read(_mjcf, _urdf, _floating, _start)
 
 
 def unlike_read(*kinds: Callable[[], Iterable[Asked]]) -> tuple[Found, ...]:
@@ -177,6 +183,14 @@ def _urdf() -> Iterator[Asked]:
     yield "turn of arm", 4.0 * w * w - 1.0, trace
     turns = np.array([stands[2, 1] - stands[1, 2], stands[0, 2] - stands[2, 0], stands[1, 0] - stands[0, 1]])
     yield "axis of the turn of arm", 4.0 * w * np.array(along), turns
+
+
+def _floating() -> Iterator[Asked]:
+    """Yield where a body stands that floats on a fixed link, turned by a right angle about z, and at 0.6 rad to it."""
+    right, c, s = math.sqrt(0.5), math.cos(0.3), math.sin(0.3)
+    yield from fields(scene_of(FLOATS, "known.urdf"), "bodies", "ship", {
+        "position": (1.0, 2.5, 3.25), "orientation": (right * c, -right * s, right * s, right * c),
+    })  # fmt: skip
 
 
 def _start() -> Iterator[Asked]:

@@ -7,6 +7,7 @@ some of them above what is claimed and some below, and the one that must be name
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 
@@ -16,6 +17,8 @@ from crossbody.cases import Tier, Trajectory
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Body, Joint, Scene
 from crossbody.reports.judging.asked import Found, rows_of
+from crossbody.reports.judging.parts import part_of
+from crossbody.reports.judging.remedies import remedy
 from crossbody.reports.judging.told import runs_of, sentence
 from crossbody.reports.judging.truth_row import start_below
 from crossbody.reports.judging.verdict import Row, Verdict, Word
@@ -35,7 +38,7 @@ def wrong() -> tuple[Found, ...]:
     """Return what is said, number, least and most, and of what, where another number is named than must be."""
     unnamed = (("verdict sentence", math.nan, (value, value), f"made-up rows: {what}") for value, what in _unnamed())
     below = rows_of(_below, lambda why: ("start", math.nan, (0.0, 0.0), f"a start below surfaces, which ends in {why}"))
-    return (*unnamed, *below)
+    return (*unnamed, *below, *_longer())
 
 
 def _unnamed() -> Iterator[tuple[float, str]]:
@@ -50,6 +53,17 @@ def _unnamed() -> Iterator[tuple[float, str]]:
             for row, place in zip(wanted, places, strict=True):
                 if place < 0 or places != sorted(places):
                     yield row["value"], f"{kind}, {_words(row)}"
+
+
+def _longer() -> Iterator[Found]:
+    """Yield the step, s, that is named as a shorter one of a run and is none, or NaN where none is named."""
+    for step in 10.0 ** np.random.default_rng(SEED).uniform(-6.0, 2.0, DRAWS):
+        row = _row("e0", METRICS[0], Word.INFO, 1.0, math.nan).row() | {"settings": f"dt={float(step):g}"}
+        part = row | {"metric": part_of(METRICS[0], "step"), "known": LIMIT}
+        said = re.search(r"shorter step \(--set-engine e0\.dt=([^)]+)\)", remedy("e0:p", [row, part], METRICS[0]))
+        named = float(said[1]) if said else math.nan
+        if not 0.0 < named < 0.6 * step:  # half the step at least shows what falls with it
+            yield "shorter step", named, (0.0, 0.6 * float(step)), "made-up rows: what makes an error smaller"
 
 
 DEEP = {"knee high": (-0.594, "rad"), "rail low": (-0.0027, "m"), "tip low": (-0.031, "m")}

@@ -30,9 +30,10 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     laws without memory let go at the surface whatever pushes there. So does, of a contact that sticks, how
     far its friction is below its bound: where it reaches that, and would jam, its multiplier jumps to zero.
     Left out are those at whose instant something else happens, by which a multiplier may jump through zero,
-    and a start in contact. Only what is beyond the errors of a row at its surface counts; where one touch is
-    located another may join that is as near as positions are known. None without rows that touch, and where
-    gaps depend on discrete variables; NaN where an event has no instant.
+    and a start in contact: touches of a row that was at or below its surface until then. Only what is beyond
+    the errors of a row at its surface counts; where one touch is located another may join that is as near as
+    positions are known. None without rows that touch, and where gaps depend on discrete variables; NaN where
+    an event has no instant.
     """
     system = equations(case)
     if not case.law.touches.any() or len(run.t) < 2 or (system is not None and system.jumps):
@@ -46,6 +47,8 @@ def measure(truth: Truth, run: Trajectory, case: Case) -> float | None:
     for event in run.events:
         row = event.contact
         if not case.law.touches[row] or event.t <= run.t[0]:
+            continue
+        if _touches(event) and np.all(run.gap[run.t < event.t, row] <= near):
             continue
         joins = _touches(event) and event.t in located
         gap = _ways(run.t, run.gap[:, row], event.t, JOINS * _size(run.q) if joins else near)

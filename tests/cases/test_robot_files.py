@@ -853,6 +853,15 @@ def test_the_profile_of_a_file_as_it_stands_has_a_name_of_its_own(tmp_path: Path
     assert choice.of_case(asked, case).profile == "default"
 
 
+@pytest.mark.parametrize("name", ["a0", "a1"])
+def test_a_file_as_it_stands_follows_no_law_that_was_asked_for(tmp_path: Path, name: str) -> None:
+    engine, path = engines.load("mujoco"), write(tmp_path)
+    asked = cases.load(path, "raised", **{name: 5.0})
+    assert "--law" in str(engine.why_not(asked, "as_is"))
+    assert engine.why_not(asked, "matched") is None
+    assert engine.why_not(cases.load(path, "raised"), "as_is") is None
+
+
 SERVO = """
 <mujoco><compiler angle="radian"/><worldbody><body><joint name="hinge" axis="0 1 0" damping="2"/>
 <geom type="capsule" fromto="0 0 0 .4 0 0" size=".03" mass="1.2"/></body></worldbody><actuator>

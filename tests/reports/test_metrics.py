@@ -356,6 +356,11 @@ def test_a_start_in_contact_is_no_touch_that_is_off_its_surface(truth: Truth, ca
     )
     later = tuple(replace(e, t=0.01 * case.t_end) for e in begun)
     assert measure("event_gap", truth, replace(run, events=later), case) > 1.0
+    below = replace(run, events=later, gap=np.where(run.t[:, None] <= later[0].t, -0.5, run.gap))
+    assert measure("event_gap", truth, replace(below, events=later[:1]), case) == 0.0
+    left = below.gap.copy()
+    left[0] = 0.5
+    assert measure("event_gap", truth, replace(below, events=later[:1], gap=left), case) > 0.1
 
 
 @pytest.mark.parametrize(("off", "limit"), [(0.0, 0.0), (5e-7, 0.0), (1e-3, np.inf)])
