@@ -8,6 +8,7 @@ the bodies is even in their velocities.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,8 @@ SIZES = (0.3, 3.0, 30.0, 300.0)
 """Of controls: within any range, and beyond it."""
 ROUNDS, NEAR, FAST, SEED = 3, 0.3, 2.0, 20240917
 """Draws of each size; how far a state is from the start, m or rad, and how fast it moves, SI; and of what is drawn."""
+AGE = 0.07
+"""How long ago an activation was told, s."""
 EXACT = 1e-9
 """Part of the largest force in the equations by which sums in another order differ."""
 STEP, SMOOTH = 1e-5, 1e-6
@@ -125,6 +128,12 @@ def _within(x: float, bounds: Vector) -> float:
     return min(max(float(x), float(bounds[0])), float(bounds[1]))
 
 
+def _later(one: Actuator, a: float, c: float) -> float:
+    """Return the activation that was a AGE before, under a control: tau a' = c - a of a filter, a' = c else."""
+    still = c + (a - c) * math.exp(-AGE / one.time_constant) if one.activation == "filter" else a + c * AGE
+    return _within(still, one.activation_range)
+
+
 def _part(actuator: Actuator) -> str:
     return f"joint {actuator.joint}" if actuator.joint else f"tendon {actuator.tendon}"
 
@@ -146,8 +155,10 @@ def _of_motors(case: Case, system: System, own: Forces) -> tuple[Floats, Floats,
         u[own.driven] = size * draw.uniform(-1.0, 1.0, len(own.driven))
         a = {i: float(size * draw.uniform(-1.0, 1.0)) if i in own.driven else 0.0 for i in activated}
         for place, i in enumerate(activated):  # behind all others t0 and a0 of each
-            a[i] = _within(a[i], own.scene.actuators[i].activation_range)
-            u[len(still) - 2 * len(activated) + 2 * place + 1] = a[i]
+            one, began = own.scene.actuators[i], len(still) - 2 * len(activated) + 2 * place
+            a[i] = _within(a[i], one.activation_range)
+            u[began], u[began + 1] = -AGE, a[i]
+            a[i] = _later(one, a[i], _within(u[i], one.control_range))
         none = {i: 0.0 for i in activated}
         before, behind = (system.terms(at, rate, inputs)[1] for inputs in (still, u))
         found.append(behind - before)

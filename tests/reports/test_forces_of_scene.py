@@ -40,7 +40,14 @@ def arm(seed: int) -> Case:
         Actuator(
             name="sum", tendon="rope", gain=(5.0, 0.0, 0.0), activation="integrator", activation_range=(-1.0, 1.0)
         ),
-        Actuator(name="lag", joint="j3", gain=(2.0, 0.0, 0.0), activation="filter", time_constant=0.1),
+        Actuator(
+            name="lag",
+            joint="j3",
+            gain=(2.0, 0.0, 0.0),
+            activation="filter",
+            time_constant=0.1,
+            control_range=(-1.5, 2.0),
+        ),
     )
     scene = Scene(bodies=tuple(bodies), joints=tuple(joints), tendons=(rope,), actuators=motors)
     return case_of(scene, name="arm", t_end=0.5)
