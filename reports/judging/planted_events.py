@@ -25,7 +25,7 @@ from crossbody.reports.judging.planting import (
     roughly,
     with_signal,
 )
-from crossbody.reports.measuring.friction import rubbing, slips
+from crossbody.reports.measuring.friction import rubbing, slips, turned
 from crossbody.reports.measuring.truth import taken
 
 HAIR = 1e-7
@@ -165,7 +165,8 @@ def switched(plain: Plain) -> Iterator[Control]:
     """Record too early that what slides holds, or the other way about."""
     run = plain.run
     between = {Mode.STICK, Mode.SLIP}
-    turns = [e for e in run.events if {e.before, e.after} == between]
+    counted = {(t, slides) for _, t, slides in turned(run, plain.case)}  # slides that are too short are none
+    turns = [e for e in run.events if {e.before, e.after} == between and (e.t, e.after == Mode.SLIP) in counted]
     for slides, metric in ((False, "stick_times"), (True, "slip_times")):
         for event in [e for e in turns if (e.after == Mode.SLIP) == slides and _of_pair(plain, e)][-1:]:
             off = 0.05 * _since_last(run, event)
