@@ -50,8 +50,10 @@ def between(run: Trajectory) -> Callable[[Floats], Trajectory]:
     known: dict[int, Callable[[Floats], Floats]] = {}
 
     def piece(i: int) -> Callable[[Floats], Floats]:
+        if i in known:
+            return known[i]
         some = _samples(run, *parts[i])
-        found = known.get(i) or _piece(run.t[some], columns[some], smooth)
+        found = _piece(run.t[some], columns[some], smooth)
         return known.setdefault(i, found) if len(some) <= KEPT else found
 
     def at(times: Floats) -> Trajectory:

@@ -57,11 +57,11 @@ def counterparts(found: Sequence[Place], names: Sequence[str] = ENGINES) -> tupl
             if place.model is not None and place.system.frictional:
                 rows += [{"place": place.name, "engine": name, **NO_FRICTION} for name in names]
             continue
+        if place.system.activations is not None:
+            rows += [{"place": place.name, "engine": name, **NO_ACTIVATIONS} for name in names]
+            continue
         for name in names:
             about = {"place": place.name, "engine": name}
-            if place.system.activations is not None:
-                rows.append({**about, **NO_ACTIVATIONS})
-                continue
             try:
                 ways = engines.load(name).linearise(place.case, place.spot)
             except CrossbodyError as error:

@@ -55,13 +55,14 @@ def gaps_against(case: Case, system: System) -> tuple[AuditRow, ...]:
     """Return the same rows of equations that may be others' (as `gaps_of_scene` of the case's own)."""
     assert case.scene is not None
     draw = np.random.default_rng(SEED)
-    q = _states(case, system, draw)
+    pairs = _some(case.scene)
+    q = _states(case, system, pairs, draw)
     v = draw.normal(size=(len(q), len(case.v0)))
     gaps, slips = [], []
     held = [_equations(system, at, rate) for at, rate in zip(q, v, strict=True)]
     h, moves = (np.array([one[k] for one in held]) for k in (0, 1))
     sides = [body_poses(case.scene, q + way * STEP * rates(q, v, case.quaternions)) for way in (-1.0, 0.0, 1.0)]
-    for contact, row, rub in _some(case.scene):
+    for contact, row, rub in pairs:
         sure = _sure(contact, sides[1])
         mine = h[:, row : row + contact.places]
         theirs, normals, points = meeting(contact, sides[1])
@@ -104,21 +105,21 @@ def _equations(system: System, q: Floats, v: Floats) -> tuple[Floats, Floats, Fl
     return system.gaps_along(q[None], v[None], p)[0][0], H @ v, H
 
 
-def _states(case: Case, system: System, draw: np.random.Generator) -> Floats:
+def _states(case: Case, system: System, pairs: list[tuple[Contact, int, int]], draw: np.random.Generator) -> Floats:
     """Return positions (m, nq) beside the start, and others from which pairs in turn were drawn to small gaps.
 
     H only says which way to go.
     """
     assert case.scene is not None
-    rows, none = _some(case.scene), np.zeros(len(case.v0))
+    none = np.zeros(len(case.v0))
     q = case.q0 + draw.uniform(-NEAR, NEAR, (BESIDE + TOUCHING, len(case.q0)))
     q = np.array([normalised(at, case.quaternions) for at in q])
     wanted = draw.uniform(-CLOSE, CLOSE, TOUCHING)
     for _ in range(PULLS):
-        for k, (contact, row, _) in enumerate(rows):
-            mine = slice(BESIDE + k, None, len(rows))
+        for k, (contact, row, _) in enumerate(pairs):
+            mine = slice(BESIDE + k, None, len(pairs))
             met = meeting(contact, body_poses(case.scene, q[mine]))[0]
-            for at, gaps, aim in zip(q[mine], met, wanted[k :: len(rows)], strict=True):
+            for at, gaps, aim in zip(q[mine], met, wanted[k :: len(pairs)], strict=True):
                 best = int(np.argmin(np.where(np.isfinite(gaps), gaps, np.inf)))
                 way = _equations(system, at, none)[2][row + best]
                 step = way * (aim + contact.pair.margin - gaps[best]) / max(float(way @ way), TINY)

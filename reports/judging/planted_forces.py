@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.reports.judging.planting import (
-    FEW,
     MUCH,
     PART,
     PUSHES,
@@ -24,7 +23,6 @@ from crossbody.reports.judging.planting import (
     with_signal,
 )
 from crossbody.reports.measuring.equations import equations
-from crossbody.reports.measuring.truth import taken
 
 FORCED = {2.0: "doubled", 0.0: "left out"}
 """Factors on all forces."""
@@ -89,9 +87,9 @@ def _pressed(run: Trajectory, more: float) -> Trajectory:
 
 def _laws(plain: Plain, least: float) -> Iterator[Control]:
     """Put multipliers off the law, at all of a few samples and at one."""
-    if not len(plain.quiet):
+    few = plain.few()
+    if not len(few.t):
         return
-    few = taken(plain.run, plain.quiet[:: -(-len(plain.quiet) // FEW)])
     at = tuple(np.unravel_index(np.argmax(np.abs(few.lam)), few.lam.shape))
     if np.abs(few.lam[at]) < least:
         more, said = _pressed(few, least / WEAK), f"a row presses by {least / WEAK:.3g} more"

@@ -49,7 +49,7 @@ def unturned(case: Case, run: Trajectory) -> bool:
 
 def _cumulated(plain: Plain, ways: Sequence[slice]) -> Iterator[Control]:
     """Draw a force along a tangent at every one of few samples, far apart: its impulse and work by trapezoids."""
-    system, run = equations(plain.case), taken(plain.run, plain.quiet[:: max(1, -(-len(plain.quiet) // FEW))])
+    system, run = equations(plain.case), plain.few()
     if len(run.t) < 2 or system is None or not ways or not run.lam.any():
         return
     row = ways[int(plain.draw.integers(len(ways)))].start

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from crossbody.cases import Case, Mode, Trajectory
 from crossbody.cases.arrays import Floats
+from crossbody.reports.measuring.truth import taken
 
 PART = 0.02
 """Part of the largest by which a signal is off: no limit on a motion may be as wide."""
@@ -99,6 +100,10 @@ class Plain:
         self.quiet = np.flatnonzero(nearest > QUIET * self.case.t_end)
         self.normal = np.flatnonzero(self.case.law.touches)
         self.turning = frozenset(i + k for i in self.case.quaternions for k in range(4))
+
+    def few(self) -> Trajectory:
+        """Return the motion at few quiet samples, far apart; at none where there are none."""
+        return taken(self.run, self.quiet[:: max(1, -(-len(self.quiet) // FEW))])
 
     def samples(self, among: NDArray[np.bool_] | None = None) -> list[int]:
         """Draw quiet samples of those that are asked for: one early and one late, in any order."""

@@ -118,11 +118,9 @@ def multipliers(motion: Trajectory) -> tuple[Floats, None]:
     return motion.lam, None
 
 
-def impulse_upto(run: Trajectory, t: float) -> Floats:
-    """Return the cumulative impulse of a motion at an instant, s, of its own clock (nc,), N s, with its collisions."""
-    smooth = np.array([[np.interp(t, run.t, one) for one in cumulative(run).T]])
-    found: Floats = collided(np.array([t]), smooth, run.events)[0]
-    return found
+def impulse_upto(run: Trajectory, times: Floats) -> Floats:
+    """Return the cumulative impulses of a motion at times (m,), s, of its own clock (m, nc), N s, with collisions."""
+    return collided(times, straight(run.t, cumulative(run), times), run.events)
 
 
 def stopping(run: Trajectory) -> NDArray[np.bool_]:

@@ -66,12 +66,12 @@ def _totals(truth: Truth, run: Trajectory, case: Case, last: int) -> tuple[Float
     """
     own, end = truth.trajectory, run.t[[last]]
     if counts_itself(run, own):
-        return impulse_upto(run, end[0]), collided(end, integrated(own, multipliers, end), own.events)[0]
+        return impulse_upto(run, end)[0], collided(end, integrated(own, multipliers, end), own.events)[0]
     inside, exact = aligned(truth, run, case)
     run, exact = before_stops(run, exact)
     upto = min(int(np.count_nonzero(inside)) - 1, last)
-    rest = impulse_upto(own, end[0]) - impulse_upto(own, exact.t[upto])
-    return impulse_upto(run, end[0]), true_impulse(run, exact, own)[upto] + rest
+    rest = impulse_upto(own, end) - impulse_upto(own, exact.t[[upto]])  # at one instant twice they are two sides
+    return impulse_upto(run, end)[0], true_impulse(run, exact, own)[upto] + rest[0]
 
 
 def lam_impulse_path(truth: Truth, run: Trajectory, case: Case) -> float | None:
