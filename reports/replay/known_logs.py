@@ -17,20 +17,13 @@ from crossbody.hw.windows import turns
 from crossbody.hw.windows.whiteness import autocorrelation
 from crossbody.reports.judging.asked import Found, Within, unlike
 from crossbody.reports.judging.known_turns import about
-from crossbody.reports.replay.known_replay import read
+from crossbody.reports.replay.known_replay import EVEN, read
 
 STEP, SLOW = 0.01, 3e-3
 """Between samples, s, and the part by which a clock is slow."""
 LONG, ALIKE = 600, 0.03
 """Samples of a motion, and the part by which its own bends hide the size of a slip."""
-DAMAGED = """
-[time]
-column = "t"
-unit = "s"
-sample_time = 0.01
-[coordinates.a]
-column = "a"
-unit = "m"
+DAMAGED = f"""{EVEN}unit = "m"
 """
 
 

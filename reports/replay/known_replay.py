@@ -74,14 +74,16 @@ delay = 0.004
 """
 TURN = 0.3
 """By how much an angle grows in a sample, rad."""
-TURNS = """
+EVEN = """
 [time]
 column = "t"
 unit = "s"
 sample_time = 0.01
 [coordinates.a]
 column = "a"
-unit = "deg"
+"""
+"""A map of samples at even instants: what is told of a coordinate follows, its unit first."""
+TURNS = f"""{EVEN}unit = "deg"
 [inputs.u]
 column = "u"
 unit = "N"
