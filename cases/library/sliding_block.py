@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
-from crossbody.cases.case import Case, Limit, Parameter, Prediction, Value
+from crossbody.cases.case import Case, Parameter, Prediction, Value
 from crossbody.cases.files.case import case_of
 from crossbody.cases.mechanisms.friction import blocks
 from crossbody.cases.mechanisms.friction.creeps import HOLDS, STICTION, OfMixing, OfPoint, OfRegularised
@@ -44,12 +43,6 @@ _TITLES = {
 }
 
 
-_BEHIND = Limit(
-    metric="event_gap", value=2.0, engine="pinocchio", profile="admm",
-    why="a returning corner is recorded after the step in which it pushes: the distance moved in two steps",
-)  # fmt: skip
-
-
 def build(variant: str, parameters: Mapping[str, Value]) -> Case:
     """The scene with its exact motion."""
     p = {name: float(value) for name, value in parameters.items()}
@@ -71,6 +64,4 @@ def build(variant: str, parameters: Mapping[str, Value]) -> Case:
         ("drake", "default"): OfRegularised(down / -press / p["mu"], "lagged", STICTION),
         ("drake", "matched"): OfRegularised(down / -press / p["mu"], "tamsi", HOLDS),
     } if holds else {}  # fmt: skip
-    if flat:
-        made = replace(made, limits=(*made.limits, _BEHIND))
     return limits(made, _TITLES[variant], PARAMETERS, blocks.box(p, half) if flat else blocks.point(p), p, creeps)

@@ -17,7 +17,7 @@ from crossbody.cases.scene_contacts import PLACES
 from crossbody.engines._contacts import FAR, Contacts, drift
 from crossbody.engines.equations import system_of
 from crossbody.engines.nearest import Pose
-from crossbody.reports.scenes.scene import _meeting
+from crossbody.reports.scenes.scene import meeting
 
 TURN, DRAWS, POINTS = 1e-6, 40, 4000
 GRID = 0.03
@@ -168,7 +168,7 @@ def test_instants_and_pairs_are_computed_at_once_as_one_by_one(types: tuple[str,
         swapped = {"one": poses["two"], "two": poses["one"]}
         turned_round = met.touches(swapped.__getitem__)
         np.testing.assert_allclose(found.gap[1][mine], turned_round.gap, atol=1e-15)
-        drawn_at = _meeting(met.all[0], {name: (p[None], R[None]) for name, (R, p) in poses.items()})
+        drawn_at = meeting(met.all[0], {name: (p[None], R[None]) for name, (R, p) in poses.items()})
         there = np.isfinite(drawn_at[0][0])
         np.testing.assert_allclose(drawn_at[0][0][there] - met.all[0].pair.margin, one.gap[there], atol=1e-15)
         np.testing.assert_allclose(drawn_at[2][0][there], one.point[there], atol=1e-15)
