@@ -51,11 +51,14 @@ CONVERGED = 1e-28
 """Improvement at which Newton's method ends where no row may let go: its costs are quadratic
 then, it is there after two or three iterations, and without an end it takes a hundred. Where rows
 may, rounding that is left over lets them."""
-STIFF = 1e3
-"""Times the softness of contacts and loops in space that bounds and coupled joints keep, 1e-4 of
-MuJoCo's. Newton's method ends where the costs of rows, f^2 R/2, are below 1e-15: of a newton 1e-7
-leaves multipliers of bounds off by 1e-3, 1e-4 by 1e-6 (`tests/reference/test_bounds_at_rest.py`).
-Loops in space bear many times what moves: 1e-7."""
+STIFF, LOOPS = 1e3, 30.0
+"""Times the softness of one row that bounds and coupled joints keep, and contacts and loops in space.
+
+R is 1e-4 and 3e-6 of MuJoCo's then. Newton's method ends where its step is below 1e-15, which leaves multipliers off by
+1e-15 / R: with no more than one row's, 1e-3 of a newton at bounds (`tests/reference/test_bounds_at_rest.py`), and 9e-6
+of a weight in loops (`tests/engines/test_loops_at_rest.py`). And R lam is off the law: loops in space bear many times
+what moves, so that the condition of H M^-1 H' times R, 3e-10, is what theirs are off by.
+"""
 ROUNDS = 3  # of PGS, with one row
 SOLVES = 4
 """Times that multipliers are solved for to be compared: two leave 1e-7 of Newton's end."""
@@ -345,6 +348,7 @@ def matched(scene: Scene) -> Any:
     if len(rows_of(scene)[0]) == 1:  # one row PGS solves exactly, however hard
         model.opt.solver, model.opt.iterations = mujoco.mjtSolver.mjSOL_PGS, ROUNDS
         return model
+    model.body_invweight0[:] *= LOOPS
     model.dof_invweight0[:] *= STIFF
     model.tendon_invweight0[:] *= STIFF
     return model

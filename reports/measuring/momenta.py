@@ -22,8 +22,8 @@ MOST, SPREAD = 16, 16
 """Steps that are looked at: those over which forces change most, and so many spread among all over which they do."""
 CHANGES = 1e-3
 """Part of the largest change of forces from which on they change."""
-ROUNDING = 1e-9
-"""Part of the largest force by which forces do not change."""
+ROUNDING = 1e-6
+"""Part of the largest force by which forces do not change: to that their law is held; below are ends of solvers."""
 SHORT = 1e-6
 """Part of the longest step below which a step is one that an event cut."""
 

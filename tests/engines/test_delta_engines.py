@@ -128,20 +128,24 @@ def test_parity_of_mass_bias_and_constraint_jacobian(robot, maker):
     assert worst.max() < 1e-10
 
 
+CONDITION = 1e3
+"""Of H M^-1 H', beyond which multipliers are ill posed."""
+
+
 @pytest.mark.parametrize("closed", [True, False])
 def test_multipliers_agree(robot, maker, closed):
-    """On and off the manifold: Pinocchio to 1e-10, MuJoCo matched to 1e-8; states whose lam is ill posed left out."""
+    """On and off the manifold, where lam is not ill posed: Pinocchio to 1e-10, MuJoCo to softness times condition."""
     audit, worst, counted = engines.load(maker).prepare(case_of(robot), MAKERS[maker]).audit(), 0.0, 0
     for q, v, _ in closed_states(robot.sign) if closed else zip(*(x[:200] for x in states()), strict=True):
         M, _, H = reference_terms(robot, q, v)
         code, _, lam = reference_motion(robot, q, v, np.zeros(6))
-        if np.linalg.cond(H @ np.linalg.solve(M, H.T)) > 1e3:
+        if np.linalg.cond(H @ np.linalg.solve(M, H.T)) > CONDITION:
             continue
         worst = max(worst, off(audit["lam"](q, v), lam))
         assert code == 0
         counted += 1
     assert counted > 100
-    assert worst < (1e-8 if maker == "mujoco" else 1e-10)
+    assert worst < (3e-10 * CONDITION if maker == "mujoco" else 1e-10)
 
 
 def test_motors_and_a_force_on_the_flange_act_alike(robot, maker):
