@@ -52,7 +52,7 @@ CONVERGED = 1e-28
 then, it is there after two or three iterations, and without an end it takes a hundred. Where rows
 may, rounding that is left over lets them."""
 STIFF, LOOPS = 1e3, 30.0
-"""Times the softness of one row that bounds and coupled joints keep, and contacts and loops in space.
+"""Times the softness of one row that bounds and coupled joints keep, and what loops join in space.
 
 R is 1e-4 and 3e-6 of MuJoCo's then. Newton's method ends where its step is below 1e-15, which leaves multipliers off by
 1e-15 / R: with no more than one row's, 1e-3 of a newton at bounds (`tests/reference/test_bounds_at_rest.py`), and 9e-6
@@ -348,7 +348,10 @@ def matched(scene: Scene) -> Any:
     if len(rows_of(scene)[0]) == 1:  # one row PGS solves exactly, however hard
         model.opt.solver, model.opt.iterations = mujoco.mjtSolver.mjSOL_PGS, ROUNDS
         return model
-    model.body_invweight0[:] *= LOOPS
+    looped = {
+        model.body(name).id for loop in scene.loops if loop.in_space for name in (loop.first, loop.second) if name
+    }
+    model.body_invweight0[[*looped]] *= LOOPS
     model.dof_invweight0[:] *= STIFF
     model.tendon_invweight0[:] *= STIFF
     return model
