@@ -47,8 +47,9 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     until = case.t_end if known is None else min(known.until, case.t_end)
     value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
     short, other = truth.trusted < until, int(truth.agreement.get("modes", 0.0))
-    beside = {name: off for name in BESIDE_MOTION if not (off := truth.agreement.get(name, 0.0)) <= PARTED}
-    told = [f"{_whose(name)} is {off:.1e}, beyond {PARTED:g}." for name, off in beside.items()]
+    most = _beside(case, truth.agreement.get("position", 0.0))
+    beside = {name: off for name in BESIDE_MOTION if not (off := truth.agreement.get(name, 0.0)) <= most}
+    told = [f"{_whose(name)} is {off:.1e}, beyond {most:.2g}." for name, off in beside.items()]
     if other:
         told.append(f"At {other} samples its two sources have rows in other modes.")
     if short:
@@ -78,6 +79,16 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
         regression=Regression.LOST if lost else "",
         compared=truth.part * min(truth.trusted / case.t_end, 1.0),
     )]  # fmt: skip
+
+
+def _beside(case: Case, apart: float) -> float:
+    """Return by how much sources of a motion may differ in forces and energies, which are apart by a part of it.
+
+    Forces are second derivatives: where a scene's laws are faster than its motion they are off by as much more.
+    """
+    law = case.law
+    fastest = float(np.max(np.maximum(law.a1, np.sqrt(law.a0)), initial=0.0)) * case.t_end
+    return max(PARTED, apart * fastest**2) if case.general else PARTED
 
 
 def _whose(name: str) -> str:
