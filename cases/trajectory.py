@@ -142,7 +142,9 @@ class Trajectory:
             where too many contacts could change at one instant to try all their sets
             (`not_searched`): what follows may be one motion of several. A truth tries more than a run.
         energy_gained: what touches with friction gave out beyond what they had taken in, J
-            (`touches_that_gained`); only `compiled` with a ledger tells.
+            (`touches_that_gained`); of the reference, other engines tell nothing.
+        energy_handed: what contacts with friction gave out that began below their surface, J
+            (`starts_inside`); likewise.
         control_s: part of `wall_s` that was spent in that controller, s.
     """
 
@@ -169,6 +171,7 @@ class Trajectory:
     unique_until: float = math.inf
     searched_until: float = math.inf
     energy_gained: float = 0.0
+    energy_handed: float = 0.0
     sol: Callable[..., tuple[Floats, Floats]] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:

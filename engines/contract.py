@@ -73,6 +73,8 @@ class Engine(ABC):
             dt (v + theta (v+ - v)); NaN without such steps, infinite where theta is a file's. Those that it takes
             first, accelerations, friction and the setting `restitution` are held against the law's
             (`crossbody.reports.judging.first_steps`).
+        held: profiles of these whose rows that are always on follow the law, to the order of the step; others hold
+            them in a way of their own.
         late: profiles of these whose contacts push by the force of the step before: none of a first blow is held.
         of_scenes: profile -> the one that stands for it in a scene, a robot's file say, where all
             profiles are meant.
@@ -86,6 +88,7 @@ class Engine(ABC):
     hidden: Mapping[str, Mapping[str, str]] = NOTHING
     orders: Mapping[str, float] = NOTHING
     steps: Mapping[str, float] = NOTHING
+    held: Set[str] = frozenset()
     late: Set[str] = frozenset()
     of_scenes: Mapping[str, str] = NOTHING
     interpreted: Mapping[str, str] = NOTHING

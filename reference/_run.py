@@ -287,6 +287,7 @@ class CompiledRun:
             undetermined_by=float(state["open_way"]) if state["indeterminate"] and not state["loops_press"] else 0.0,
             unique_until=float(state["unique_until"]) if state["not_unique"] or state["unmet"] else np.inf,
             energy_gained=float(state["energy_gained"]),
+            energy_handed=float(state["energy_handed"]),
             searched_until=float(state["searched_until"]) if state["not_searched"] else np.inf,
         )  # fmt: skip
         if self.callback is not None:

@@ -103,6 +103,7 @@ class Pinocchio(Engine):
     versions: Mapping[str, str] = {"pin": pin.__version__, "scikit-sundae": solvers.VERSION}
     orders: Mapping[str, float] = dict.fromkeys(profiles, 1.0)
     steps: Mapping[str, float] = {"admm": 0.5, **dict.fromkeys(RULES, math.nan)}
+    held = frozenset({"admm"})
     interpreted: Mapping[str, str] = {
         "*": "the loop over steps, the rows of the law, gaps; Pinocchio's algorithms are called from Python"
     }

@@ -13,6 +13,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, pushed, weigh
 from crossbody.reference.core.algebra import ULP, copy
+from crossbody.reference.core.dop853 import OPEN
 from crossbody.reference.core.friction import is_shared
 from crossbody.reference.core.journal import blame
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
@@ -24,7 +25,6 @@ from crossbody.reference.kinds import Bytes
 CLOSE = 1e-9  # part of the terms behind a row's multiplier: rounding stays far below, and asks no further
 WRONG = 1e-6  # part of all terms of a row's law: more is no rounding, however ill-conditioned the rows are
 SELDOM = 64  # steps between two looks at a system that brings its own algebra: they cost two right-hand sides
-OPEN = 30.0  # times what the tolerance may add to the energy of all steps: a first step can be fourteen of it off
 
 
 @compiled

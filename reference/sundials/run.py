@@ -398,6 +398,7 @@ class SundialsRun:
                 | self.touches.told
             ),
             energy_gained=self.touches.gained,
+            energy_handed=self.touches.handed,
             ledger=Ledger(contact=z[:, :nc], input=z[:, nc], dissipated=z[:, nc + 1]) if self.scene.nz else None,
         )  # fmt: skip
         if self.controller is not None:

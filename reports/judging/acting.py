@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.cases import Acts, Case, Trajectory
-from crossbody.reports.measuring.momenta import unexplained, unseen
+from crossbody.reports.measuring.momenta import of_cut_steps, unexplained, unseen
 
 FAR = 0.25
 """Part of half of a change of forces from which on momenta are not explained; of a wrong rule it is 1 or 2."""
@@ -41,6 +41,7 @@ def misacting(case: Case, settings: Mapping[str, Any], run: Trajectory) -> Itera
         settings: of the run; one with a step `dt` tells its own steps.
         run: with forces that change.
     """
+    yield from _cut(case, run)
     found = unexplained(run, case)
     if found is None or not found.size > LIGHT:
         return
@@ -54,6 +55,17 @@ def misacting(case: Case, settings: Mapping[str, Any], run: Trajectory) -> Itera
         )
     elif run.acts == Acts.AT and "dt" in settings and found.whole[Acts.AT] > COARSE:
         yield found.whole[Acts.AT], f"{said} {found.whole[Acts.AT]:.3g} of the largest of their changes unexplained."
+
+
+def _cut(case: Case, run: Trajectory) -> Iterator[tuple[float, str]]:
+    """Yield by what forces are too small that are impulses over whole steps, where their own are cut, and why."""
+    for by, times in zip(*(of_cut_steps(run, case, 1.0 - FAR) or ((), ())), strict=True):
+        if abs(by - times) < NEARER * (times - 1.0):
+            yield (
+                1.0 - 1.0 / by,
+                f"Forces of a step that is cut to 1/{times:.3g} are 1/{by:.3g} of what velocities gain.",
+            )
+            return
 
 
 def uncertain(case: Case, run: Trajectory) -> Mapping[str, str]:

@@ -240,7 +240,8 @@ def first_steps(
     probe = Probe(case, *who, used, asked, theirs, system, same and "dt" in used and not math.isnan(theta))
     try:
         touching = () if case.file or who[1] in who[0].late else _blows(probe)
-        return (*(_free(probe) if probe.steps else ()), *(_driven(probe) if probe.steps else ()), *touching)
+        held = _held(probe) if probe.steps and who[1] in who[0].held else ()
+        return (*(_free(probe) if probe.steps else ()), *held, *(_driven(probe) if probe.steps else ()), *touching)
     except (CrossbodyError, np.linalg.LinAlgError):  # a state that the engine or the reference refuses
         return ()
 
@@ -304,6 +305,34 @@ def _driven(probe: Probe) -> Iterator[AuditRow]:
         found = 2.0 * stepped(2 * DRIVEN) - stepped(DRIVEN)
         off = float(np.max(np.abs(found - wanted) / np.maximum(np.abs(wanted), LIGHT * size)))
         yield _row("activations", found / t_end, wanted / t_end, off, OF_DRIVES)
+
+
+def _held(probe: Probe) -> Iterator[AuditRow]:
+    """Step beside the surfaces of rows that are always on, and across them: h'' = -a1 h' - (a0 + a2 h^2) h.
+
+    Each of the three parts is as large as the others: at a gap h, and a rate that a0 h and a1 h' are alike for.
+    """
+    rows, law, other = probe.held, probe.case.law, probe.opening
+    if not len(rows) or probe.system.control is not None:
+        return
+    gap, dt = probe.theirs["gap"](probe.case.q0), PART * probe.dt
+    draw = np.random.default_rng(SEED)
+    high, apart = CLEAR * _sized(draw, (len(rows),)), np.maximum(gap[other], 0.0) + 10.0 * CLEAR
+    q = probe.placed(np.concatenate([rows, other]), np.concatenate([high, apart]))
+    H = probe.theirs["H"](q)[rows]
+    rates = np.where(law.a1[rows] > 0.0, law.a0[rows] * CLEAR / np.maximum(law.a1[rows], SHOWN), 0.0)
+    v = np.linalg.lstsq(H, rates * _sized(draw, (len(rows),)))[0]
+    h, hd = probe.theirs["gap"](q)[rows], H @ v
+    run = probe.stepped(q, v, PART, 1)
+    if run is None or not np.allclose(h, high, rtol=0.0, atol=1e-3 * CLEAR):
+        return
+    parts = np.stack([law.a1[rows] * hd, (law.a0[rows] + law.a2[rows] * h * h) * h])
+    wanted = -parts.sum(axis=0)
+    bends = probe.theirs["H"](run.q[-1])[rows] @ run.v[-1] - hd
+    size = np.maximum(np.abs(parts).sum(axis=0), SHOWN / dt)
+    implicit = float(np.max(law.a1[rows] * dt + (law.a0[rows] + law.a2[rows] * h * h) * dt * dt))  # to first order
+    off = float(np.max(np.abs(bends / dt - wanted) / size))
+    yield _row("held rows", bends / dt, wanted, off, TOLERANCE + implicit)
 
 
 def _has_more(probe: Probe) -> bool:

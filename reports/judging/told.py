@@ -266,6 +266,8 @@ def _off(run: EngineRun, row: Row) -> str:
         size = f"{number}, {in_times(times)} its limit"
     if row.get("unit") == "%" and math.isfinite(times):  # a share of the whole is no multiple of what it may lack
         size = f"{row['value']:.3g} %, where {valid(row['expected'], row['limit'])} % is valid"
+    if times <= 1.0 and run.who.startswith(TRUTH):  # where its sources stand is not what is off
+        return f"{row['metric']} on {run.label} ({_CLAUSE.split(row['why'])[0]})"
     return f"{run.who.removesuffix(':')} on {run.label} ({row['metric']} {size}{_blamed(run, row['metric'])})"
 
 

@@ -20,7 +20,7 @@ from crossbody.reports.judging.reach import BUDGET, SHORTEST, Followed, estimate
 from crossbody.reports.judging.stored import changed
 from crossbody.reports.measuring.alignment import matched
 from crossbody.reports.measuring.modes import violated
-from crossbody.reports.measuring.scale import RESTS
+from crossbody.reports.measuring.scale import RESTS, energy
 from crossbody.reports.measuring.slow_slips import firm_until
 from crossbody.reports.measuring.truth import Truth, sample_times, shortened
 
@@ -44,6 +44,8 @@ AGREES = STEPS * GROWTH
 MULTIPLIED = 1e3
 """How many times as large an error of the start may have become where a run with the default
 tolerance is still judged: its limits, 1e-6 of a motion, grow no further than to 1e-3."""
+GAINS = {"energy_gained": "touches_that_gained", "energy_handed": "starts_inside"}
+"""Of touches, which energies and which of their numbers both sources of a truth tell."""
 GROWN = 1e3
 """A growth rate is read from where the two part by so many roundings of the largest coordinate."""
 
@@ -446,8 +448,32 @@ def agreement(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:
     found = {name: metrics.load(name).measure(truth, second, case) for name in ("position", "event_times")}
     if truth.tier is Tier.C and not case.general:  # of a scene, rows that share a load may switch in any order
         found["modes"] = _other_modes(truth, second, case)
+    if truth.tier is Tier.C and not (_share(truth.trajectory) or _share(second)):
         found |= _accounts(truth, second, case)
+    if truth.tier is Tier.C and case.rubs and math.isinf(truth.trusted):  # a motion tells this of the whole alone
+        found |= _touches(truth.trajectory, second)
     return {name: value for name, value in found.items() if value is not None}
+
+
+def _share(run: Trajectory) -> bool:
+    """Whether rows of a motion depend on each other: what one of them does is then one of many answers."""
+    return bool(run.counts.get("redundant", 0))
+
+
+def _touches(exact: Trajectory, second: Trajectory) -> dict[str, float]:
+    """Return by how much else two motions say that touches gave out, over the largest energy, and how many more.
+
+    Of those whose gain is below what tolerances leave open either may count some: such numbers are no difference.
+    """
+    found, scale = dict[str, float](), energy(exact)
+    if scale == 0.0:
+        return found
+    for amount, count in GAINS.items():
+        a, b = getattr(exact, amount), getattr(second, amount)
+        found[amount] = abs(a - b) / scale
+        many = exact.counts.get(count, 0), second.counts.get(count, 0)
+        found[count] = float(abs(many[0] - many[1])) if max(a, b) > PARTED * scale else 0.0
+    return found
 
 
 def _accounts(truth: Truth, second: Trajectory, case: Case) -> dict[str, float]:

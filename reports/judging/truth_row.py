@@ -10,11 +10,11 @@ import numpy as np
 from crossbody.cases import Case
 from crossbody.cases.scene_contacts import turning
 from crossbody.reports.judging.stored import SAME_END, compared_until
-from crossbody.reports.judging.truth import PARTED
+from crossbody.reports.judging.truth import GAINS, PARTED
 from crossbody.reports.judging.verdict import Regression, Verdict, Word
 from crossbody.reports.measuring.truth import TRUTH, Truth, shortened
 
-BESIDE_MOTION = ("energy_integrator", "contact_work", "lam_impulse_path")
+BESIDE_MOTION = ("energy_integrator", "contact_work", "lam_impulse_path", *GAINS, *GAINS.values())
 """Of a second source, what it records beside its motion: that this is right its motion does not tell."""
 
 
@@ -47,8 +47,15 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     until = case.t_end if known is None else min(known.until, case.t_end)
     value = max(truth.agreement.get("position", math.inf), truth.agreement.get("event_times", 0.0) / case.t_end)
     short, other = truth.trusted < until, int(truth.agreement.get("modes", 0.0))
-    beside = {name: off for name in BESIDE_MOTION if not (off := truth.agreement.get(name, 0.0)) <= PARTED}
-    told = [] if known is None else [f"Known up to {until:.4g} s: {known.why}."]
+    most = _beside(case, truth.agreement.get("position", 0.0))
+    beside = {name: off for name in BESIDE_MOTION if not (off := truth.agreement.get(name, 0.0)) <= most}
+    told = [f"{_whose(name)} is {off:.1e}, beyond {most:.2g}." for name, off in beside.items()]
+    if other:
+        told.append(f"At {other} samples its two sources have rows in other modes.")
+    if short:
+        told.append(f"It must be trusted to {until:.4g} s.")
+    if known is not None:
+        told.append(f"Known up to {until:.4g} s: {known.why}.")
     told.append(f"{truth.source}.")
     if many := truth.trajectory.counts.get("not_searched", 0):
         told.append(
@@ -58,13 +65,8 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
     if many := truth.trajectory.counts.get("touches_that_gained", 0):
         gained = truth.trajectory.energy_gained
         told.append(f"Touches with friction that gave out more than they took in: {many}, by {gained:.3g} J in all.")
-    if other:
-        told.append(f"At {other} samples its two sources have rows in other modes.")
-    told += [f"The {name} of its second source is {off:.1e}, beyond {PARTED:g}." for name, off in beside.items()]
     if below := start_below(case, truth):
         told.append(below)
-    if short:
-        told.append(f"It must be trusted to {until:.4g} s.")
     if truth.part < 1.0:
         asked = case.t_end / truth.part
         told.append(f"Followed to {case.t_end:.4g} s of {asked:.4g} s: {truth.short}.")
@@ -77,6 +79,22 @@ def truth_row(case: Case, truth: Truth, command: str) -> list[Verdict]:
         regression=Regression.LOST if lost else "",
         compared=truth.part * min(truth.trusted / case.t_end, 1.0),
     )]  # fmt: skip
+
+
+def _beside(case: Case, apart: float) -> float:
+    """Return by how much sources of a motion may differ in forces and energies, which are apart by a part of it.
+
+    Forces are second derivatives: where a scene's laws are faster than its motion they are off by as much more.
+    """
+    law = case.law
+    fastest = float(np.max(np.maximum(law.a1, np.sqrt(law.a0)), initial=0.0)) * case.t_end
+    return max(PARTED, apart * fastest**2) if case.general else PARTED
+
+
+def _whose(name: str) -> str:
+    """Say of what a number is: of the second source, or of what both tell of touches in another way."""
+    both = name in (*GAINS, *GAINS.values())
+    return f"The difference of its sources in {name}" if both else f"The {name} of its second source"
 
 
 def of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> Verdict:

@@ -72,6 +72,31 @@ def unexplained(run: Trajectory, case: Case) -> Unexplained | None:
     )
 
 
+def of_cut_steps(run: Trajectory, case: Case, cut: float) -> tuple[Floats, Floats] | None:
+    """Return by what forces of cut steps must be multiplied to be what velocities gained (m,), and what cut them (m,).
+
+    That is how many times as long the longest step is: a force that is an impulse over that, and not over its own step,
+    is as many times too small. None of a run whose forces are not means of steps, or where nothing can be told.
+
+    Args:
+        run: the motion.
+        case: what moved.
+        cut: part of the longest step below which a step is cut.
+    """
+    if run.acts not in (Acts.BEFORE, Acts.BEHIND) or (system := _told(run, case)) is None:
+        return None
+    dt, pushed = np.diff(run.t), run.lam[1:] if run.acts == Acts.BEFORE else run.lam[:-1]
+    longest, largest = float(dt.max()), float(np.max(np.abs(run.lam)))
+    pushes = np.max(np.abs(pushed), axis=1) > CHANGES * largest
+    at = np.flatnonzero((dt > SHORT * longest) & (dt < cut * longest) & pushes)[-MOST:]
+    if not len(at):
+        return None
+    M, left, _, (_, first, last) = _left(system, run, at, _inputs(system, run, case))
+    own = last if run.acts == Acts.BEFORE else first
+    by = 1.0 + np.einsum("mi,mij,mj->m", own, M, left[run.acts]) / np.maximum(_sizes(M, own), TINY)
+    return by, longest / dt[at]
+
+
 def unseen(run: Trajectory, case: Case) -> float:
     """Return which part of impulses trapezoids of the samples do not see, or make up, by what velocities gained.
 

@@ -43,6 +43,7 @@ NOT_KEPT = (
     "unique_until",
     "searched_until",
     "energy_gained",
+    "energy_handed",
 )
 """Of a motion, what pages and later comparisons do not ask for."""
 

@@ -16,6 +16,7 @@ from crossbody.cases import closed_forms as cf
 from crossbody.engines import Engine, Run
 from crossbody.engines._acting import Acting
 from crossbody.engines._scene import Forces
+from crossbody.engines.pinocchio._admm import TimeStepper
 from crossbody.reports.judging import first_steps as first_steps_of
 from crossbody.reports.judging.audit import AuditRow, audit
 from crossbody.reports.judging.first_steps import _of_law, first_steps
@@ -28,6 +29,7 @@ SEEN = {
     ("bouncing_ball:linear", "dart:matched"): FREE + BLOW + MEETS,
     ("bouncing_ball:elastic", "pymunk:default"): FREE + BLOW + MEETS,
     ("bouncing_ball:listing", "exudyn:default"): FREE,
+    ("bouncing_ball:bilateral", "pinocchio:admm"): ("held rows",),
     ("newtons_cradle:pendulums", "pinocchio:admm"): FREE + BLOW + MEETS,
     ("newtons_cradle:unequal", "pinocchio:impulse_simultaneous"): BLOW,
     ("dry_oscillator:swings", "mujoco:default"): FREE,
@@ -37,7 +39,7 @@ SEEN = {
     ("tossed_cube:tumbles", "dart:matched"): FREE + BLOW + MEETS + RUBS,
     ("tossed_cube:loaded", "mujoco:default"): FREE + MEETS + RUBS,
 }
-"""What is told of whom; of a case with rows that are always on, or a machine of its own, nothing is."""
+"""What is told of whom; of a case with rows that are always on their law alone, of a machine of its own nothing."""
 
 
 class Changed(Engine):
@@ -46,6 +48,7 @@ class Changed(Engine):
     def __init__(self, inner: Engine, change: Callable[[Trajectory], Trajectory]) -> None:
         self.inner, self.change = inner, change
         self.name, self.profiles, self.versions, self.steps = inner.name, inner.profiles, inner.versions, inner.steps
+        self.held = inner.held
 
     def prepare(self, case: Case, profile: str = "matched", **settings: Any) -> Run:
         return ChangedRun(self.inner.prepare(case, profile, **settings), self.change)
@@ -165,6 +168,26 @@ def test_a_restitution_that_was_asked_for_is_what_pairs_part_with() -> None:
         used = {**engine.prepare(case, "admm").settings, "restitution": claimed}
         rows = first_steps(case, (engine, "admm"), used, {"restitution": 0.5}, (), theirs)
         assert [row.ok for row in rows if row.quantity == "restitution"] == [ok]
+
+
+PARTS = ((1.05, 1.0, 1.0), (1.0, 1.05, 1.0), (1.0, 0.0, 1.0))
+"""By which parts of a law are multiplied: some per cent, and what leaves one out."""
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("times", PARTS)
+def test_another_law_of_rows_that_are_always_on_is_told(
+    seed: int, times: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw = np.random.default_rng(seed)
+    given = {"a0": float(10.0 ** draw.uniform(1.0, 4.0)), "a1": float(10.0 ** draw.uniform(0.0, 2.5))}
+    label, who = "bouncing_ball:bilateral", "pinocchio:admm"
+    assert told(label, who, **given)["held rows"].ok
+    right = TimeStepper._held
+    monkeypatch.setattr(
+        TimeStepper, "_held", lambda self, h, hd, law, dt: right(self, h, hd, np.multiply(law, times), dt)
+    )
+    assert not told(label, who, **given)["held rows"].ok
 
 
 def test_an_engine_of_ones_own_that_promises_no_steps_is_not_asked() -> None:
