@@ -340,11 +340,14 @@ def touches_too(s: Any, m: Model, w: Work, mode: Bytes, i: int) -> bool:
     """Whether row i touches with another that has just been found to: it closes, and is as near as positions are known.
 
     What a touch exchanges may have third rows let go for good: rounding must not choose which of two comes first.
+    Beside friction one that stands still touches too: a load shared by the corners that rounding alone has closing
+    would have the others slide, however slowly, and slides jam.
     """
     if s.fsm != LEVEL or mode[i] != FREE or not m.unilateral[i] or m.follows[i] >= 0:
         return False
     collides = s.frozen and m.beta[i, 0] > 0.0
-    return bool(not collides and w.rate[i] < -slow(s, w, i) and abs(w.gap[i]) <= known(s, w))
+    most = slow(s, w, i) if s.frictional else -slow(s, w, i)
+    return bool(not collides and w.rate[i] < most and abs(w.gap[i]) <= known(s, w))
 
 
 @compiled

@@ -39,7 +39,7 @@ OF_FRICTION = (
     "seen", "down2", "across2", "weight", "found", "beside", "left", "press", "full", "load", "chosen", "tolerated",
     "turn_by", "bent", "turning", "turned", "pushed", "within", "slid", "left2", "part2", "share2", "loop", "drawn",
     "borne", "even", "carried", "known", "off_by", "course", "island", "packed", "calm", "spot",
-    "begin_at", "end_at",
+    "begin_at", "end_at", "digit",
     "calm_place", "calm_size", "isle_unknowns", "isle_normals", "isle_rank", "isle_second", "isle_held", "isle_grown",
     "remains", "pivots", "taken", "root_weight", "asked", "touch_work", "touch_given",
     "touch_open", "deepest", "taken_in",
@@ -371,6 +371,7 @@ class Work:
     wants: Bytes  # mode that each contact would rather have
     sets: Bytes2  # (64, nc) sets that were tried
     begins: Bytes  # contacts that have reached their bounds at this instant
+    digit: Bytes  # which of the modes that a contact may have is tried
     since: Floats  # (nc,) instant since which a slip has just begun, at w.rest; -inf for one like any other
     cones: Floats2  # (5, nc) at the nodes of the step: how far a contact is from sliding, or one that slides from a jam
     bare: Floats  # (nc,) right-hand sides without what pulls sticking rows back

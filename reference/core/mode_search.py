@@ -41,7 +41,7 @@ from crossbody.reference.core.mode_set import (
 SWEEPS = 60
 TURNS = 40  # of directions of slip towards those of acceleration
 TURNED = 1e-12
-MOST_SETS = 256
+FEW_SETS, MANY_SETS = 256, 4096  # that are tried where others may be found, and before a motion is given up
 EVERY = -1  # island
 BELOW = 1e-6  # part of its bound by which a force stays below it to count as that of a contact that sticks
 WORST, ALL = np.arange(2)  # of what is violated: how much is changed at once
@@ -221,71 +221,104 @@ def swept(s: Any, m: Model, w: Work, together: int) -> bool:
 
 
 @compiled
-def vary(s: Any, m: Model, w: Work, number: int, island: int) -> int:
-    """Put contacts in the modes that a number says digit by digit, 0 for that of w.sets[0]; how many differ.
-
-    They are those of an island by w.island, or all for EVERY.
-
-    Directions of slip are those of reference, and of the digit 3 their opposites.
-    """
-    changed = 0
-    for j in range(s.na):
-        i = w.idx[j]
-        if is_decided(w, i) and island in (EVERY, w.island[j]):
-            digit, number = number % 4, number // 4
-            changed += digit > 0
-            start = w.sets[0, i]
-            state = start if digit == 0 else (STICK if digit == 1 else SLIP)
-            if not has_friction(m, i):
-                state = start if digit == 0 else (FREE if start == STICK else STICK)
-            elif digit == 3 and w.stands[i]:
-                for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
-                    w.way[w.idx[c]] = -w.way[w.idx[c]]
-            elif digit == 3 or (digit == 1 and not w.stands[i]) or digit == start_digit(start):
-                state = start if is_dry(m, i) else FREE
-            put(m, w, i, state)
-    return changed
+def choices(m: Model, w: Work, i: int) -> int:
+    """How many modes a contact may have: what slides, or has no friction, goes on as it does, or presses no more."""
+    if w.stands[i] and has_friction(m, i):
+        return 4
+    return 1 if is_dry(m, i) else 2
 
 
 @compiled
-def start_digit(state: int) -> int:
+def vary(s: Any, m: Model, w: Work, island: int) -> None:
+    """Put contacts of an island by w.island, or all for EVERY, in the modes that w.digit says, 0 for that of w.sets[0].
+
+    Directions of slip are those of reference, and of the digit 3 their opposites.
+    """
+    for j in range(s.na):
+        i = w.idx[j]
+        if is_decided(w, i) and island in (EVERY, w.island[j]):
+            digit, start = w.digit[i], w.sets[0, i]
+            state = start if digit == 0 else (STICK if digit == 1 else SLIP)
+            if digit > 0 and not has_friction(m, i):
+                state = FREE if start == STICK else STICK
+            elif digit > 0 and not w.stands[i]:
+                state = FREE if start == SLIP else SLIP
+            elif digit == 3:
+                for c in range(first_row(m, w, i), first_row(m, w, i) + m.tangents[i]):
+                    w.way[w.idx[c]] = -w.way[w.idx[c]]
+            elif digit > 0 and digit == _start_digit(start):
+                state = start if is_dry(m, i) else FREE
+            put(m, w, i, state)
+
+
+@compiled
+def _start_digit(state: int) -> int:
     """The digit that would name the mode in which a contact is already: it stands for being off."""
     return 1 if state == STICK else (2 if state == SLIP else 0)
 
 
 @compiled
-def near_sets(s: Any, m: Model, w: Work) -> bool:
-    """Try sets by the number of contacts in which they differ from the present one; whether one is consistent.
+def _begin_digits(s: Any, m: Model, w: Work, differing: int) -> bool:
+    """Let w.digit differ from 0 in the first so many contacts that have a choice, as 1; whether there are so many."""
+    for j in range(s.na):
+        i = w.idx[j]
+        if is_decided(w, i):
+            w.digit[i] = differing > 0 and choices(m, w, i) > 1
+            differing -= w.digit[i]
+    return differing == 0
+
+
+@compiled
+def _next_digits(s: Any, m: Model, w: Work) -> bool:
+    """Go on to the next w.digit that differs from 0 in as many contacts; False if there is none."""
+    passed, before = 0, False
+    for j in range(s.na):
+        i = w.idx[j]
+        if not is_decided(w, i) or choices(m, w, i) == 1:
+            continue
+        if w.digit[i] > 0 and w.digit[i] + 1 < choices(m, w, i):
+            w.digit[i] += 1
+            return True
+        w.digit[i] = min(w.digit[i], 1)
+    for j in range(s.na):
+        i = w.idx[j]
+        if not is_decided(w, i) or choices(m, w, i) == 1:
+            continue
+        if before and w.digit[i] == 0:
+            for a in range(j):
+                if is_decided(w, w.idx[a]) and choices(m, w, w.idx[a]) > 1:
+                    w.digit[w.idx[a]] = passed > 1
+                    passed -= w.digit[w.idx[a]]
+            w.digit[i] = 1
+            return True
+        before = w.digit[i] > 0
+        passed += before
+    return False
+
+
+@compiled
+def near_sets(s: Any, m: Model, w: Work, most: int) -> bool:
+    """Try `most` sets by the number of contacts in which they differ from what sweeps give; whether one is consistent.
 
     If none of all is, contacts jam in one of them: without a jam in any there would be a motion. One that jams in a set
     that was tried is noted where there are too many to try them all, too.
     """
     sweep(s, m, w)
     keep(s, w)
-    contacts = 0
-    for j in range(s.na):
-        contacts += is_decided(w, w.idx[j])
-    tried, all_sets, jam = 0, 4 ** min(contacts, 12), -1
-    for differing in range(contacts + 1):
-        for number in range(all_sets):
-            digits, rest = 0, number
-            while rest > 0:
-                digits += rest % 4 > 0
-                rest //= 4
-            if digits != differing:
-                continue
+    differing, tried, jam = 0, 0, -1
+    while tried < most and _begin_digits(s, m, w, differing):
+        more = True
+        while more and tried < most:
             for i in range(s.nc):
                 w.way[i] = w.kept_way[i]
-            vary(s, m, w, number, EVERY)
+            vary(s, m, w, EVERY)
             if judge(s, m, w) < 0 and goes_on(s, m, w):
                 return True
             if jam < 0:
                 jam = jammed(s, m, w)
             tried += 1
-            if tried > MOST_SETS:
-                break
-        if tried > MOST_SETS:
-            break
+            more = _next_digits(s, m, w)
+        differing += 1
     if s.pressed_in < 0:
         s.pressed_in = jam
     return False

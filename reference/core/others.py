@@ -12,7 +12,7 @@ import numpy as np
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.friction import has_friction, is_decided, is_dry
 from crossbody.reference.core.layout import SLIP, Model, Work
-from crossbody.reference.core.mode_search import aim, judge, vary
+from crossbody.reference.core.mode_search import aim, choices, judge, vary
 from crossbody.reference.core.mode_set import (
     DIFFERENT,
     evaluate_set,
@@ -28,22 +28,12 @@ DEFINITE = 1e-6  # square of a pivot, of rows of size 1, from which on a matrix 
 
 
 @compiled
-def _choices(m: Model, w: Work, i: int) -> int:
-    """How many modes a contact may have: what slides, or has no friction, goes on as it does, or presses no more."""
-    return 4 if w.stands[i] and has_friction(m, i) else 2
-
-
-@compiled
-def _number(s: Any, m: Model, w: Work, place: int, island: int) -> int:
-    """The number of `vary` for a place among all combinations of `_choices` of an island."""
-    number, unit = 0, 1
+def _take_digits(s: Any, m: Model, w: Work, place: int, island: int) -> None:
+    """Leave in w.digit, for `vary`, what stands at a place among all combinations of `choices` of an island."""
     for j in range(s.na):
         i = w.idx[j]
         if is_decided(w, i) and w.island[j] == island:
-            digit, place = place % _choices(m, w, i), place // _choices(m, w, i)
-            number += unit * (digit if w.stands[i] else 2 * digit)
-            unit *= 4
-    return number
+            w.digit[i], place = place % choices(m, w, i), place // choices(m, w, i)
 
 
 @compiled
@@ -144,7 +134,7 @@ def _sets(s: Any, m: Model, w: Work, island: int) -> int:
     sets = 1
     for j in range(s.na):
         if w.island[j] == island and is_decided(w, w.idx[j]) and sets <= s.most_sets:
-            sets *= _choices(m, w, w.idx[j])
+            sets *= choices(m, w, w.idx[j])
     return sets
 
 
@@ -155,7 +145,8 @@ def _moves_otherwise(s: Any, m: Model, w: Work, island: int, sets: int) -> bool:
     for place in range(1, sets):
         for i in range(s.nc):
             w.way[i] = w.kept_other[i]
-        vary(s, m, w, _number(s, m, w, place, island), island)
+        _take_digits(s, m, w, place, island)
+        vary(s, m, w, island)
         if judge(s, m, w) < 0 and jammed(s, m, w) < 0:
             for j in range(s.na):
                 found = found or abs(w.excess[j] - w.chosen[j]) > DIFFERENT * s.push_scale

@@ -23,6 +23,8 @@ from crossbody.reference.core.loops import is_idle
 from crossbody.reference.core.mode_path import approached
 from crossbody.reference.core.mode_search import (
     ALL,
+    FEW_SETS,
+    MANY_SETS,
     STRICT,
     STRICT_IF_DRY,
     WORST,
@@ -148,7 +150,7 @@ def _reached(s: Any, m: Model, w: Work) -> bool:
 @compiled
 def _found(s: Any, m: Model, w: Work) -> bool:
     """Whether a consistent set is reached, or found among those that differ in few contacts."""
-    return bool(_reached(s, m, w) or near_sets(s, m, w))
+    return bool(_reached(s, m, w) or near_sets(s, m, w, FEW_SETS))
 
 
 @compiled
@@ -239,7 +241,7 @@ def decide(s: Any, m: Model, w: Work) -> int:
     look(s, m, w)
     if not (_found(s, m, w) or _found_if_fewer_begin(s, m, w)):
         s.leeway = max(_most_pull(s, m, w), decided_to(s))
-        if not (_found(s, m, w) or _found_beside_a_jam(s, m, w)):
+        if not (_found(s, m, w) or _found_beside_a_jam(s, m, w) or near_sets(s, m, w, MANY_SETS)):
             return _mark(s, m, w)
     strays = _meet_all(s, m, w)
     if strays >= 0:

@@ -53,7 +53,7 @@ def enumerated(G: np.ndarray, bare: np.ndarray, contacts: list[Contact]) -> list
     found = []
     for modes in product(*own):
         for ways in _directions(G, bare, contacts, modes):
-            found.append(_tried(G, bare, contacts, modes, ways))
+            found.append(tried(G, bare, contacts, modes, ways))
     return found
 
 
@@ -133,9 +133,10 @@ def _directions(
     return [fixed | {i: ends[:, k] for k, i in enumerate(free)} for ends in kept]
 
 
-def _tried(
+def tried(
     G: np.ndarray, bare: np.ndarray, contacts: list[Contact], modes: tuple[str, ...], ways: dict[int, np.ndarray]
 ) -> Tried:
+    """Return one set of modes, of contacts that slide in the given directions."""
     lam, excess, jams = _solved(G, bare, contacts, modes, ways)
     kept = [np.inf]
     for i, (one, mode) in enumerate(zip(contacts, modes, strict=True)):
