@@ -71,13 +71,13 @@ def show(rows: Sequence[Row], times: Times) -> None:
 
 
 def show_code(rows: Sequence[Row], code: int) -> None:
-    """Print, where numbers are off that do not count as wrong, that the exit code does not tell of them."""
+    """Print how many numbers are off that the exit code does not count, if there are any."""
     known, loose = sum(row["verdict"] == Word.EXPECTED for row in rows), sum(map(beyond, rows))
     told = [
         f"{count} {what}" for count, what in ((known, Word.EXPECTED), (loose, "beyond a limit but not judged")) if count
     ]
     if code == 0 and told:
-        click.echo(layout.told(f"Exit code 0: nothing is outside. It does not tell of the {' and '.join(told)}."))
+        click.echo(layout.told(f"Exit code 0: nothing is outside. Not counted: {', '.join(told)}."))
 
 
 def _relative(runs: Sequence[EngineRun]) -> bool:
