@@ -14,7 +14,7 @@ from crossbody.reports.figures.section import Figure
 from crossbody.reports.figures.styles import COLOURS, DASHES, LEVEL, Panels
 
 MARKS = ("x", "circle-open", "square-open", "diamond-open", "triangle-up-open")
-SAME = 1e-9  # part of the largest pole by which two at one point may differ
+NEAR = 0.02  # part of the largest pole within which marks are too close to be told apart
 USUAL = 0.98  # part of a map that its colours tell apart: beside a singular pose growth has no bound
 RESPONDING = 1e-12  # part of the largest magnitude below which a response is none
 
@@ -22,7 +22,7 @@ RESPONDING = 1e-12  # part of the largest magnitude below which a response is no
 def pole_figure(rows: pd.DataFrame) -> Figure:
     """Poles of every place in the complex plane; those of several at one point are marks around each other.
 
-    How many lie at one point is written beside it.
+    How many marks lie so close that they cover each other is written beside them.
     """
     plane = _plane("Poles of the linear models")
     for i, (place, group) in enumerate(rows.groupby("place", sort=False)):
@@ -39,8 +39,8 @@ def pole_figure(rows: pd.DataFrame) -> Figure:
 
 
 def _together(x: Floats, y: Floats) -> dict[tuple[float, float], int]:
-    """Return points, and how many of those given lie at each, to a part SAME of the largest."""
-    size = SAME * max(float(np.max(np.hypot(x, y), initial=0.0)), 1e-300)
+    """Return points, and how many of those given lie near each, within a part NEAR of the largest."""
+    size = NEAR * max(float(np.max(np.hypot(x, y), initial=0.0)), 1e-300)
     found: dict[tuple[float, float], int] = {}
     for one in zip(x.tolist(), y.tolist(), strict=True):
         near = next((point for point in found if np.hypot(point[0] - one[0], point[1] - one[1]) <= size), one)

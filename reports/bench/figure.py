@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import Panels, look
+from crossbody.reports.figures.styles import Panels, logarithmic, look
 
 FLOOR = 1e-16  # least error that is drawn
 LABEL = 11  # height of the name of a rung, pixels
@@ -47,8 +47,8 @@ def work_precision(rows: pd.DataFrame) -> Figure:
                 pd.Series(edge, group.index[~reached]),
                 told | marks | {"showlegend": not reached.any()},
             )
-    panels.axes("x", type="log", title="relative error of position and event times", exponentformat="power")
-    panels.axes("y", type="log", title="run time, median [ms]", exponentformat="power")
+    panels.axes("x", title="relative error of position and event times", **logarithmic(finite.clip(lower=FLOOR)))
+    panels.axes("y", title="run time, median [ms]", **logarithmic(rows["median_ms"]))
     return panels.figure()
 
 

@@ -35,6 +35,7 @@ BY = {
     "equilibria": {"above": "place", "names": "variable"},
 }
 """How the lines of tables are named, and what stands above them."""
+TITLES = {"equilibria": "values at the operating points"}  # of which some may be instants of a motion
 SHARED = "How these share their load the equations leave open, and multipliers of least norm are shown"
 BESIDE = ["place", "way", "slope", "poles", "verdict"]
 """Columns that are printed of the differences of engines."""
@@ -132,7 +133,7 @@ def _show(label: str, tables: Mapping[str, pd.DataFrame]) -> None:
         if not len(tables.get(key, ())):
             continue
         shown = tables[key].head(SHOWN).drop(columns="shared", errors="ignore")
-        print_rows(shown, 6, f"{label}: {key}\n", heads=UNITS, **BY.get(key, {"above": "place"}))
+        print_rows(shown, 6, f"{label}: {TITLES.get(key, key)}\n", heads=UNITS, **BY.get(key, {"above": "place"}))
         if len(tables[key]) > SHOWN:
             click.echo(f"... {len(tables[key]) - SHOWN} more rows; --out DIR keeps all.")
         if "shared" in tables[key] and tables[key]["shared"].any():

@@ -16,6 +16,7 @@ from crossbody.reports.judging.parts import PARTS, part_of
 from crossbody.reports.judging.told import EngineRun, beyond, runs_of, sentence
 from crossbody.reports.judging.verdict import NOT_MEASURED, Regression, Row, Word
 from crossbody.reports.layout import NO_BREAK, unit_text
+from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.pages.results import Times
 from crossbody.reports.runs.choice import DEFAULT_ENGINES
 
@@ -70,13 +71,13 @@ def show(rows: Sequence[Row], times: Times) -> None:
 
 
 def show_code(rows: Sequence[Row], code: int) -> None:
-    """Print, where numbers are off that do not count as wrong, that the exit code does not tell of them."""
+    """Print how many numbers are off that the exit code does not count, if there are any."""
     known, loose = sum(row["verdict"] == Word.EXPECTED for row in rows), sum(map(beyond, rows))
     told = [
         f"{count} {what}" for count, what in ((known, Word.EXPECTED), (loose, "beyond a limit but not judged")) if count
     ]
     if code == 0 and told:
-        click.echo(layout.told(f"Exit code 0: nothing is outside. It does not tell of the {' and '.join(told)}."))
+        click.echo(layout.told(f"Exit code 0: nothing is outside. Not counted: {', '.join(told)}."))
 
 
 def _relative(runs: Sequence[EngineRun]) -> bool:
@@ -167,7 +168,8 @@ def _unfinished(run: EngineRun, row: Row) -> str:
 
 def _wrong(run: EngineRun, row: Row) -> str:
     number = ""
-    if row["verdict"] == Word.OUTSIDE:
+    statement = run.who.startswith(TRUTH) and math.isnan(row["value"])  # of a case: no number is missing
+    if row["verdict"] == Word.OUTSIDE and not statement:
         size = f"{row['value']:.4g}{unit_text(row['unit'])}".replace(" ", NO_BREAK)
         number = " has no number" if math.isnan(row["value"]) else f" {size}"
         number += "" if math.isnan(row["limit"]) else f", limit{NO_BREAK}{row['limit']:.4g}"

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases.arrays import Floats
 from crossbody.reports.figures.section import Figure
@@ -38,6 +38,7 @@ LEVEL = "#8a8a8a"
 LINE = {"color": LEVEL, "dash": "dash", "width": 1}
 """Where a limit, or a bound, is."""
 ACROSS = 0.09  # between two columns, part of the width
+APART, MOST, FEW = 0.72, 8, 3  # of labels of a logarithmic axis: decades between two, how many, and of a short one
 
 
 def label(trace: Trace) -> str:
@@ -103,6 +104,19 @@ def level(axis: str, value: float, name: str) -> dict[str, Any]:
     ends = {"xref": f"x{axis[1:]} domain", "yref": axis, "x0": 0.0, "x1": 1.0, "y0": value, "y1": value}
     line = {"color": LEVEL, "width": 1.2, "dash": "dash"}
     return {"type": "line", "layer": "above", "line": line, "name": name} | ends
+
+
+def logarithmic(values: ArrayLike) -> dict[str, Any]:
+    """A logarithmic axis over values: labelled at whole powers of ten, over less than two decades between them too.
+
+    plotly labels whole powers alone where it is asked for at most one label in 0.7 decades, and every digit where it is
+    asked for more than three in a decade.
+    """
+    seen = np.asarray(values, dtype=np.float64)
+    seen = seen[np.isfinite(seen) & (seen > 0.0)]
+    decades = float(np.ptp(np.log10(seen))) if len(seen) else 0.0
+    most = int(min(decades / APART, MOST)) if decades >= 2.0 else FEW
+    return {"type": "log", "nticks": most, "exponentformat": "power"}
 
 
 class Panels:

@@ -85,6 +85,7 @@ class Split:
         known: part -> what both are known to.
         says: how the converged motion is known.
         missing: part -> why it is not known.
+        shorter: whether it is of less than all that is judged.
     """
 
     where: str
@@ -93,6 +94,7 @@ class Split:
     known: Mapping[str, float]
     says: str
     missing: Mapping[str, str]
+    shorter: bool = False
 
 
 def part_of(metric: str, part: str) -> str:
@@ -140,7 +142,7 @@ def _split(laid: Positions | Events, metric: str, positions: Positions, study: S
     return Split(
         where=where, there={part: along(error) for part, error in errors.items()},
         largest={part: float(np.max(laid.sizes(error))) for part, error in errors.items()},
-        known=known, says=says, missing=missing,
+        known=known, says=says, missing=missing, shorter=positions.shorter,
     )  # fmt: skip
 
 
@@ -202,8 +204,8 @@ def observed(errors: Sequence[Floats], sizes: Sequence[float]) -> tuple[float, S
     falls = f"fall {ratio:.2g} times" if ratio > 1.0 else "do not fall"
     raise NotMeasuredError(
         f"No order between steps of {_listed(sizes[k : k + 3])} s, so nothing is extrapolated: "
-        f"the differences {falls} from one pair to the next, and {unlike:.0%} "
-        "of them is not a power of the step."
+        f"the differences {falls} from one pair to the next, and {unlike:.0%} of their size "
+        "does not follow a power of the step."
     )
 
 
@@ -293,6 +295,7 @@ class Positions:
 
     Attributes:
         whole: that of the run that is judged (samples, components).
+        shorter: whether not all of that run is compared, as another ends before by the truth's clock.
     """
 
     def __init__(self, case: Case, truth: Truth, run: Trajectory, until: float = math.inf) -> None:
@@ -311,6 +314,7 @@ class Positions:
         self.long = far_apart(run.t[inside], case)
         between = self._between(t)
         self.t = np.concatenate([t[self.samples], between])
+        self.kept, self.shorter, self._rounding = np.arange(len(self.t)), False, REACHED * case.t_end
         self.whole = np.concatenate([error[kept], self._lay(run, truth, between)]) if len(between) else error[kept]
 
     def _clock(self, truth: Truth, run: Trajectory) -> Floats:
@@ -335,10 +339,25 @@ class Positions:
         return self.laid[id(run)]
 
     def expect(self, runs: Sequence[Trajectory]) -> None:
-        """Have the truth found at once for all runs that will be laid on it, but for those that are."""
-        if self.whole.size:
-            clocks = (self._clock(self.truth, run) for run in runs if len(run.t) and id(run) not in self.laid)
-            self.truth.expect(_asked(t, distinct(_around(t, self.t)), self.truth) for t in clocks)
+        """Have the truth found at once for all runs that will be laid on it, but for those that are.
+
+        One that touches late ends earlier on the truth's clock than on its own: there the comparison of all ends.
+        """
+        if not self.whole.size:
+            return
+        fresh = [run for run in runs if len(run.t) and id(run) not in self.laid]
+        clocks = [self._clock(self.truth, run) for run in fresh]
+        whole = self.run.t[-1] - self._rounding
+        self._end(min((t[-1] for run, t in zip(fresh, clocks, strict=True) if run.t[-1] >= whole), default=math.inf))
+        self.truth.expect(_asked(t, distinct(_around(t, self.t)), self.truth) for t in clocks)
+
+    def _end(self, end: float) -> None:
+        """Compare up to an instant, s, but keep one."""
+        inside = self.t <= max(end + self._rounding, self.t.min())
+        if not inside.all():
+            self.shorter = True
+            self.t, self.whole, self.kept = self.t[inside], self.whole[inside], self.kept[inside]
+            self.laid = {run: error[inside] for run, error in self.laid.items()}
 
     def _lay(self, run: Trajectory, truth: Truth, instants: Floats) -> Floats:
         """Return the error of a run at instants (m,) of the truth's clock.
@@ -347,8 +366,9 @@ class Positions:
         cubic through the rates of both.
         """
         t = self._clock(truth, run)
-        if not len(t) or t[-1] < instants.max() - REACHED * self.case.t_end:
-            raise NotMeasuredError(f"A run of the study ends at t = {float(run.t[-1]) if len(t) else 0.0:.6g} s.")
+        if not len(t) or t[-1] < instants.max() - self._rounding:
+            ends = f"{float(run.t[-1]) if len(t) else 0.0:.6g} s"
+            raise NotMeasuredError(f"Another run of the engine, which the parts need, ends too early, at t = {ends}.")
         before, behind = around = _around(t, instants)
         needed = distinct(around)
         exact = truth.at(_asked(t, needed, truth))
@@ -370,7 +390,8 @@ class Positions:
         t = self._clock(own, self.run)
         exact = own.at(np.minimum(t[self.samples], float(own.trajectory.t[-1])))
         error, between = self._error(self.run.q[self.samples], exact.q), self._between(t)
-        return np.concatenate([error, self._lay(self.run, own, between)]) if len(between) else error
+        found = np.concatenate([error, self._lay(self.run, own, between)]) if len(between) else error
+        return found[self.kept]
 
     def _filled(self, rates: Floats) -> Floats:
         """Return rates (n, nv) as errors count: relative, with a zero behind those of each rotation (n, components)."""

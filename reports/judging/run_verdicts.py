@@ -502,7 +502,7 @@ def _unlike(judge_: Judge, name: str, found: Split, whole: float) -> Iterator[Ve
     Parts of instants may be more, where what brings an event about comes near zero slowly (`measuring.instants`).
     """
     own, total = judge_.entry.own, sum(found.there.values())
-    shorter = own is not None and own.trusted < judge_.truth.trusted
+    shorter = found.shorter or (own is not None and own.trusted < judge_.truth.trusted)
     off = whole - total if name == "event_times" else abs(total - whole)
     if shorter or "model" not in found.there or not off > SUM * abs(whole) + ROUNDING:
         return

@@ -331,7 +331,7 @@ def energy(traces: Sequence[Trace], points: int = POINTS, limits: Limits = NONE)
         if run.ledger is None:
             continue
         work = run.ledger.contact.sum(axis=1)
-        if work.any():
+        if np.any(np.abs(work) > floor):  # below is rounding
             sheet.line(trace, 1, work)
         book = work + run.ledger.input - run.ledger.dissipated
         sheet.line(trace, 2, apart(run.total_energy - run.total_energy[0], book - book[0], floor), floor=floor)

@@ -27,11 +27,11 @@ from crossbody.reports.pages.figures import (
 )
 from crossbody.reports.pages.sheet import off_scale
 from crossbody.reports.runs.store import Trace
-from crossbody.reports.runs.thin import keep
 from crossbody.reports.scenes.scene import slip
 
 MOST_CONTACTS = 6  # of which one can be chosen
 DOT = 3e-3  # part of a plot that a line is not seen below
+TINY = float(np.finfo(float).tiny)
 MOST_OF_DEPTH = 1500  # points of one engine's line
 MOST_OF_COMB = 400  # points of an engine whose line would be a comb
 OVER_DEPTH = (
@@ -159,7 +159,11 @@ def _over_depth(trace: Trace, k: int, most: int) -> tuple[Floats, Floats] | None
     near = carries | np.append(carries[1:], False) | np.insert(carries[:-1], 0, False)
     unknown = ~np.isfinite(lam + depth)
     x, y = (np.where(unknown, np.nan, np.where(carries, values, 0.0))[near] for values in (depth, lam))
-    at = distinct(keep(np.arange(len(y), dtype=np.float64), y, np.zeros(0), most), np.flatnonzero(~carries[near]))
+    drawn = np.nan_to_num(np.stack([x, y]))
+    steps = np.diff(drawn, axis=1, prepend=drawn[:, :1]) / np.maximum(np.ptp(drawn, axis=1, keepdims=True), TINY)
+    along = np.cumsum(np.linalg.norm(steps, axis=0))  # a long rest is one place, and takes no points from an impact
+    even = np.searchsorted(along, np.linspace(0.0, along[-1], most)) if len(y) > most else np.arange(len(y))
+    at = distinct(even, drawn.argmax(axis=1), drawn.argmin(axis=1), np.flatnonzero(~carries[near]))
     return x[at], y[at]
 
 

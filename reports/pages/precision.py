@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from crossbody.reports.figures.section import Figure, Plot, Section
-from crossbody.reports.figures.styles import LINE, look, place_of, plain
+from crossbody.reports.figures.styles import LINE, logarithmic, look, place_of, plain
 from crossbody.reports.judging.verdict import Row
 from crossbody.reports.pages.results import Results
 from crossbody.reports.runs.study import read_json
 
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "triangle-down", "pentagon", "star", "hexagon")
 FLOOR = 1e-16
+ERROR, TIME = "relative error of position", "run time [ms]"
 RUNS = (
     "Each engine once, at its own setting; lower left is better. An engine without a position to "
     "compare is not shown; one whose error is not finite is a cross at the right edge. For whole "
@@ -81,8 +82,8 @@ def cloud(points: Mapping[str, Sequence[tuple[str, float, float]]]) -> Figure:
     layout = {
         "title": {"text": "Run time against error of position, one mark for each case"}, "height": 460,
         "showlegend": True, "meta": "marks",
-        "xaxis": _decades("relative error of position", [error for _, error, _ in every]),
-        "yaxis": _decades("run time [ms]", [ms for *_, ms in every]),
+        "xaxis": {"title": {"text": ERROR}} | logarithmic([error for _, error, _ in every]),
+        "yaxis": {"title": {"text": TIME}} | logarithmic([ms for *_, ms in every]),
     }  # fmt: skip
     return {"data": data, "layout": layout}
 
@@ -127,13 +128,7 @@ def scatter(points: Sequence[tuple[str, float, float]], limits: Sequence[float] 
         "shapes": [
             {"type": "line", "x0": x, "x1": x, "yref": "paper", "y0": 0.0, "y1": 1.0, "line": LINE} for x in limits
         ],
-        "xaxis": _decades("relative error of position", [max(error, FLOOR) for error in finite]),
-        "yaxis": _decades("run time [ms]", [ms for _, _, ms in points]),
+        "xaxis": {"title": {"text": ERROR}} | logarithmic([max(error, FLOOR) for error in finite]),
+        "yaxis": {"title": {"text": TIME}} | logarithmic([ms for _, _, ms in points]),
     }  # fmt: skip
     return {"data": data, "layout": layout}
-
-
-def _decades(title: str, values: Sequence[float]) -> dict[str, Any]:
-    """A logarithmic axis; of more than a decade, labelled at whole ones alone."""
-    wide = bool(values) and max(values) > 20.0 * min(values)
-    return {"type": "log", "title": {"text": title}, "exponentformat": "power"} | ({"dtick": 1} if wide else {})

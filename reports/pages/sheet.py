@@ -9,12 +9,12 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from crossbody.cases import Mode, Trajectory
 from crossbody.cases.arrays import Floats, distinct
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import called, coded, label, level, number, plain, single, style
+from crossbody.reports.figures.styles import called, coded, label, level, logarithmic, number, plain, single, style
 from crossbody.reports.measuring.truth import TRUTH
 from crossbody.reports.runs.store import Trace
 from crossbody.reports.runs.thin import AROUND, keep
@@ -165,12 +165,16 @@ class Sheet:
         limits = [(f"y{place[row]}", value, name) for row, value, name in self.limits if row in place]
         return {"data": data, "layout": layout | {"shapes": [level(*one) for one in limits]}}
 
+    def _span(self, row: int) -> ArrayLike:
+        """What the axis of a plot covers."""
+        return self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
+
     def _seen(self) -> tuple[dict[int, list[tuple[float, str]]], list[str]]:
         """Half widths and names of the bands that are wider than the line that they are around, and what others are."""
         found: dict[int, list[tuple[float, str]]] = {}
         narrow: dict[int, dict[str, float]] = {}
         for row, half, name in (one for one in self.bands if one[0] in {at for at, *_ in self.lines}):
-            seen = self.ranges.get(row) or np.concatenate([y[np.isfinite(y)] for at, y, _ in self.lines if at == row])
+            seen = self._span(row)
             if 2.0 * half * PLOT > SEEN * np.ptp(seen):
                 found.setdefault(row, []).append((half, name))
             else:
@@ -217,7 +221,7 @@ class Sheet:
                 ends = self.ranges[row]
                 axes[f"yaxis{number(i + 1)}"]["range"] = np.log10(ends).tolist() if row in self.decades else list(ends)
             if row in self.decades:
-                axes[f"yaxis{number(i + 1)}"] |= {"type": "log", "nticks": 9, "exponentformat": "power"}
+                axes[f"yaxis{number(i + 1)}"] |= logarithmic(self._span(row))
             top += heights[i] + below[i]
         return axes, TOP + inside + BOTTOM
 

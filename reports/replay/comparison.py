@@ -193,7 +193,7 @@ def _correlations(found: Comparison, prediction: Prediction) -> Iterator[dict[st
 
 
 def residuals(found: Comparison, points: int = 2000) -> pd.DataFrame:
-    """Measured less predicted (`value`) and measured, at even samples of all windows, ends included."""
+    """Measured minus predicted (`value`) and measured, at even samples of all windows, ends included."""
     windows = np.repeat(np.arange(len(found.windows)), [len(w.t) for w in found.windows])
     at = distinct(np.linspace(0, len(windows) - 1, min(points, len(windows))).astype(int))
     rows = [pd.DataFrame(columns=list(RESIDUALS))] if not found.predictions else []

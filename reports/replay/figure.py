@@ -22,7 +22,7 @@ SIGMAS = 2.0  # half of the noise band, standard deviations
 def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()) -> Figure:
     """What was measured, and what every engine predicts in its band of noise, a plot a channel.
 
-    Windows that were held out of a fit are shaded; values of rows are measured less predicted.
+    Windows that were held out of a fit are shaded; values of rows are measured minus predicted.
     """
     channels = _channels(rows)
     data: list[dict[str, Any]] = []
@@ -40,7 +40,7 @@ def motion(rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = ()
 def residual(
     rows: pd.DataFrame, noise: dict[str, float], held: Sequence[int] = (), limits: Mapping[str, float] = NONE
 ) -> Figure:
-    """Measured less predicted over time beside the noise's band, a plot a channel, a line an engine.
+    """Measured minus predicted over time beside the noise's band, a plot a channel, a line an engine.
 
     Limits are the largest that is within, by channel.
     """
@@ -55,7 +55,7 @@ def residual(
         shapes += [_rectangle(place, y=(-half, half)) | edge] if np.isfinite(half) else []
         shapes += [level(f"y{number(place)}", side * limits[channel], "limit") for side in (-1, 1) if channel in limits]
     return _figure(
-        f"Measured less predicted{_noises(channels, noise)}",
+        f"Measured minus predicted{_noises(channels, noise)}",
         data,
         [f"{name}\n[{unit}]" for name, unit in channels],
         "time [s]",

@@ -70,8 +70,8 @@ ORDERS = columns(
     promised=("Promised order", Kind.NUMBER), knob="Setting",
 )  # fmt: skip
 TIMINGS = columns(
-    case="Case", who="Engine", knob="Setting", setting=("Value", Kind.NUMBER), error=("Error", Kind.NUMBER),
-    median_ms=("Median [ms]", Kind.NUMBER), native_ms=("Its own loop [ms]", Kind.NUMBER),
+    case="Case", who="Engine", median_ms=("Median [ms]", Kind.NUMBER), error=("Error", Kind.NUMBER),
+    setting=("Setting", Kind.NUMBER), knob="Which", native_ms=("Its own loop [ms]", Kind.NUMBER),
     call_ms=("Whole call [ms]", Kind.NUMBER), iqr_ms=("IQR [ms]", Kind.NUMBER), against="Against the truth of",
     tier="Tier", error_q=("Position", Kind.NUMBER), error_v=("Velocity", Kind.NUMBER),
     error_impulse=("Impulse", Kind.NUMBER), error_energy=("Energy", Kind.NUMBER),

@@ -31,7 +31,7 @@ MEANS = {
     "end_median": "at the end of a window, median over windows",
     "end_90": "at the end of a window, 90 % quantile over windows",
 }
-JUDGED = {"within": "within its limit of growth", "outside": "it has grown beyond its limit"}
+JUDGED = {"within": "within the limit of its growth", "outside": "it has grown beyond its limit"}
 OF_FIT = (
     "These residuals are what the fit leaves in its windows, from the starts that it fits, sample by sample: the "
     "intervals come from them, and are wider where they are correlated. Metrics and residuals of the replay below are "
@@ -82,7 +82,7 @@ def sections(out: Path) -> tuple[Section, ...]:
         plots.append(Plot(name="identify-correlation", figure=figure.together(drawn["correlation"])))
     first = Section(name="identify", title="Identified parameters", says=says, text=text, tables=tables)
     shown = (
-        Section(name="identify-left", title="What the fit leaves", text=OF_FIT, plots=left),
+        Section(name="identify-left", title="Residuals of the fit", text=OF_FIT, plots=left),
         Section(name="identify-plots", title="How well they are determined", text=PROFILE, plots=plots),
     )
     return (first, *(section for section in shown if section.plots))

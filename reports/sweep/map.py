@@ -50,7 +50,7 @@ def in_words(rows: pd.DataFrame) -> str:
     ]
     if len(bad):
         each = bad.groupby(bad["engine"] + ":" + bad["profile"], sort=False)
-        told.append("; not " + "; not ".join(f"{len(own)} of {who}: {_ends(own)}" for who, own in each))
+        told.append("; the others are " + "; ".join(f"{len(own)} of {who} ({_ends(own)})" for who, own in each))
     told.append(f". {len(judged)} had a truth")
     if not math.isnan(worst := _worst(judged["error"])):
         told.append(f", the largest relative error is {worst:.2g}")

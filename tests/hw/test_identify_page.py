@@ -44,7 +44,7 @@ def test_white_residuals_of_a_fit_stand_beside_predictions_that_are_off_by_their
     assert "of predictions of all windows from their measured starts" in text
     _check_left(out, angle, fit["fitted"])
     assert "On held-out windows the rmse changed" in text
-    assert re.search(r"to [\d.]+ rad \(within its limit of growth\)\.", text)
+    assert re.search(r"to [\d.]+ rad \(within the limit of its growth\)\.", text)
     case = next(out.glob("case-*.html")).read_text(encoding="utf-8")
     assert "On held-out windows the rmse changed" in case, "its page begins as the index does"
     assert "Nothing is judged" not in case
@@ -61,7 +61,7 @@ def _check_left(out: Path, angle: np.ndarray, fitted: list[int]) -> None:
         atol=1e-10,
     )  # fmt: skip
     noise = np.interp(own["t"], np.arange(len(angle)) * 2e-3, angle) - true.y[0]
-    assert np.abs(own["value"] - noise).max() < 0.3 * NOISE, "measured less predicted is the noise itself"
+    assert np.abs(own["value"] - noise).max() < 0.3 * NOISE, "measured minus predicted is the noise itself"
     lags = pd.DataFrame(json.loads((out / "identify-autocorrelation.json").read_text(encoding="utf-8"))["rows"])
     parts = [one.sort_values("t")["value"].to_numpy() for _, one in left.groupby("window")]
     products = [sum(float(r[k:] @ r[: len(r) - k]) for r in parts) for k in range(3)]

@@ -51,7 +51,7 @@ def test_replay_writes_the_report_with_the_measurement_in_it(
     assert "error_2s_median" in printed
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "is a measurement" in page
-    assert "Measured less predicted" in page
+    assert "Measured minus predicted" in page
     rows = json.loads((out / "verdicts.json").read_text(encoding="utf-8"))["rows"]
     assert {row["engine"] for row in rows} == {"reference", "mujoco"}
     assert {row["tier"] for row in rows} == {"measurement"}

@@ -88,7 +88,16 @@ def test_the_command_prints_it_before_its_tables(tmp_path: Path, capsys: pytest.
 
     analyse(str(cart(tmp_path)), None, [], [], bode=False, locus=None, mapped=False, out=None, command="")
     lines = " ".join(capsys.readouterr().out.split())
-    assert lines.index("stable, what dies out last is hinge") < lines.index("equilibria")
+    assert lines.index("stable, what dies out last is hinge") < lines.index("operating points")
+
+
+def test_no_instant_of_a_motion_is_called_an_equilibrium(capsys: pytest.CaptureFixture[str]) -> None:
+    from crossbody.reports.commands.analyse import analyse
+
+    analyse("sliding_block", None, [], [], bode=False, locus=None, mapped=False, out=None, command="")
+    said = capsys.readouterr().out
+    assert "moving" in said
+    assert "equilibri" not in said
 
 
 def test_equations_are_built_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,7 +38,7 @@ from crossbody.reports.judging.parts import (
 from crossbody.reports.judging.reach import BUDGET
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.verdict import Verdict, Word
-from crossbody.reports.measuring.truth import Truth, from_run
+from crossbody.reports.measuring.truth import Truth, from_run, taken
 from crossbody.reports.runs import choice, jobs, refined
 
 NEAR = 1e-5  # s, between which velocities are differences
@@ -327,6 +327,34 @@ def test_parts_of_a_run_with_another_clock_are_those_of_what_is_compared(late: f
     whole = metrics.load("position").measure(truth, truth.compared(run), ball)
     found = splits(ball, truth, run, Study(), own=replace(truth))["position"]
     assert sum(found.there.values()) == pytest.approx(whole, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_parts_are_compared_up_to_where_the_clocks_of_all_runs_end(seed: int) -> None:
+    """A run that touches late ends before the horizon by the truth's clock, though it goes as far as any other."""
+    ball = cases.load("bouncing_ball", "linear", t_end=1.0)
+    assert ball.closed_form is not None
+    truth = replace(from_run(ball.closed_form(np.linspace(0.0, 1.0, 301)), Tier.A, "exact"), at=ball.closed_form)
+    draw = np.random.default_rng(seed)
+    lates = draw.uniform(-0.02, 0.02) + draw.choice([-1.0, 1.0]) * 0.1 * np.array([0.4, 0.2, 0.1])
+
+    def late(by: float) -> Trajectory:
+        exact = ball.closed_form(np.linspace(0.0, 1.0 / (1.0 + by), 301))  # type: ignore[misc]
+        events = tuple(replace(event, t=(1.0 + by) * event.t) for event in exact.events)
+        return replace(exact, t=(1.0 + by) * exact.t, q=exact.q + 0.01 * by * exact.t[:, None], events=events)
+
+    runs = tuple(map(late, lates))
+    for one in runs:
+        found = splits(ball, truth, one, Study(setting="dt", sizes=(0.4, 0.2, 0.1), runs=runs))["position"]
+        assert not found.missing
+        assert {"model", "step"} <= found.there.keys()
+
+
+def test_a_run_of_a_study_that_stops_early_tells_no_parts(case: Case) -> None:
+    truth, made = from_run(wave(case, 0.005, 0.0, smooth, 1.0), Tier.A, ""), study(case, STEPS, 1e-4, 1.0)
+    short = taken(made.runs[1], np.flatnonzero(made.runs[1].t <= 1.0))
+    found = split(case, truth, made.runs[0], replace(made, runs=(made.runs[0], short, made.runs[2])))
+    assert "ends too early, at t = 1 s" in found.missing["step"]
 
 
 def test_without_the_instant_of_one_event_there_are_no_parts_of_their_errors() -> None:

@@ -159,6 +159,15 @@ def test_what_is_left_before_an_event_does_not_stretch_the_plot_of_steps(seed: i
     assert -3.0 < high < -2.0
 
 
+def test_work_of_contacts_that_is_rounding_is_not_drawn(result: CaseResult) -> None:
+    trace = Trace(about={"engine": "truth", "profile": ""}, run=result.entries[0].run)  # type: ignore[arg-type]
+    ledger = trace.run.ledger
+    assert ledger is not None
+    small = 1e-18 * np.sin(np.arange(len(ledger.contact)))[:, None] * float(np.abs(trace.run.energy).max())
+    drawn = figures.energy([replace(trace, run=replace(trace.run, ledger=replace(ledger, contact=small)))])
+    assert "work of contacts" in drawn["layout"]["title"]["text"]  # empty and left out
+
+
 def test_without_a_force_no_work_of_contacts_is_drawn(result: CaseResult) -> None:
     trace = study.traces(result)[0]
     assert trace.run.ledger is not None

@@ -738,7 +738,7 @@ def test_timings_and_names_of_rungs_are_read_on_a_narrow_screen(whole: Path, bro
         " return [...table.querySelectorAll('th')].filter((head) => head.getBoundingClientRect().right <= end)"
         ".map((head) => head.textContent); })()"
     )
-    assert {"Value", "Error", "Median [ms]"} <= set(seen)
+    assert {"Setting", "Error", "Median [ms]"} <= set(seen)
     rungs = browser.js(
         "[...document.querySelectorAll('.plot .textpoint text')].map((text) =>"
         " [text.textContent, parseFloat(getComputedStyle(text).fontSize), text.getBoundingClientRect().toJSON()])"

@@ -57,6 +57,24 @@ def test_the_area_of_the_loop_is_the_energy_that_the_contact_lost(run: Trajector
     assert area == pytest.approx(lost, rel=0.02)
 
 
+def test_a_loop_keeps_its_bends_however_long_the_body_rests() -> None:
+    """Every sample of a contact that carries lies on the line that is drawn, to two per cent of the plot."""
+    pytest.importorskip("mujoco")
+    rests = load_engine("mujoco").prepare(load("bouncing_ball", "listing"), "matched").run()
+    (section,) = hysteresis([trace(rests)])
+    (line,) = section.plots[0].figure["data"]
+    drawn, given = (
+        np.stack(one, axis=1) for one in ((numbers(line["x"]), numbers(line["y"])), (-rests.gap[:, 0], rests.lam[:, 0]))
+    )
+    size = np.ptp(given[rests.lam[:, 0] > 0.0], axis=0)
+    drawn, given = drawn / size, given[rests.lam[:, 0] > 0.0] / size
+    start, way = drawn[:-1], np.diff(drawn, axis=0)
+    off = given[:, None] - start[None]
+    part = np.clip((off * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-300), 0.0, 1.0)
+    apart = np.linalg.norm(off - part[:, :, None] * way[None], axis=2).min(axis=1)
+    assert np.nanmax(apart) < 0.02
+
+
 def test_a_row_that_is_always_on_has_no_loop() -> None:
     case = load("bouncing_ball", "bilateral")
     assert hysteresis([trace(load_engine("reference").prepare(case, "compiled").run())]) == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from crossbody.cases import load
 from crossbody.reports.figures.section import Figure, Plot, Section
+from crossbody.reports.figures.styles import logarithmic
 from crossbody.reports.judging.run_verdicts import Entry
 from crossbody.reports.judging.truth import truth_of
 from crossbody.reports.pages import figures, html, precision, site
@@ -94,6 +96,27 @@ def test_a_name_stands_at_the_height_of_its_line(page: Path, browser: chromium.B
     apart = np.abs(np.array(starts)[:, None] - np.array(wanted)[None]).max(axis=2)
     assert np.all(apart.min(axis=1) < 0.6), "a name stands where a line ends"
     assert np.all(apart.min(axis=0) < 3.2), "a line ends within its width of one that has a name"
+
+
+TICKS = """(() => { const box = document.querySelector('.plot[data-time]');
+    const [key, axis] = Object.entries(box._fullLayout).find(([name, one]) => name[0] === 'y' && one.type === 'log');
+    const told = Object.fromEntries(Object.entries(AXIS).map(([name, value]) => [`${key}.${name}`, value]));
+    return Plotly.relayout(box, told).then(() => [...box.querySelectorAll(`.${axis._id}tick text`)].map((one) =>
+        one.textContent)); })()"""
+
+
+def test_a_logarithmic_axis_has_few_labels_however_many_decades_it_spans(page: Path, browser: chromium.Browser) -> None:
+    """Of two decades and more whole powers of ten alone; of less, no digit between two that are not told apart."""
+    browser.open(page)
+    browser.wait(DRAW)
+    rng = np.random.default_rng(3)
+    for decades in [0.3, 0.9, 1.1, 1.9, *rng.uniform(2.0, 16.0, 12)]:
+        low = rng.uniform(-12.0, -2.0)
+        axis = logarithmic(10.0 ** np.array([low, low + decades]))
+        labels = browser.js(TICKS.replace("AXIS", json.dumps(axis | {"range": [low, low + decades]})))
+        assert 1 <= len(labels) <= 9, (decades, labels)
+        if decades > 2.0:
+            assert all(label.startswith("10") or label == "1" for label in labels), (decades, labels)
 
 
 def test_names_follow_what_is_shown(page: Path, browser: chromium.Browser) -> None:

@@ -202,6 +202,15 @@ def test_a_number_that_is_none_is_not_written_as_one(capsys: pytest.CaptureFixtu
     assert "outside: ball:v mujoco:matched x has no number, limit 1e-06 The reason of these 2: the reason" in said
 
 
+def test_a_statement_about_a_case_is_no_number_that_is_missing(capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither changed limits nor a claim that the truth contradicts is one."""
+    about = row("truth", "limits", math.nan, Word.OUTSIDE) | {"profile": "", "why": "Limits are others."}
+    run_shown.show([row("mujoco", "x", 1e-7, Word.WITHIN, 1e-6), about], {})
+    said = " ".join(capsys.readouterr().out.split())
+    assert "outside: ball:v truth: limits. Limits are others." in said
+    assert "no number" not in said
+
+
 @pytest.mark.parametrize("place", range(60))
 def test_a_number_stays_with_its_unit_and_limit(place: int, capsys: pytest.CaptureFixture[str]) -> None:
     run_shown.show([row("mujoco", "x" * (place + 1), 4.56e-4, Word.OUTSIDE, 1e-5) | {"unit": "kg m^2/s"}], {})

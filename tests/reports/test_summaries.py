@@ -71,7 +71,7 @@ def test_a_sweep_says_how_many_end_as_they_must_and_who_does_not() -> None:
     )
     bad = [(Outcome.FINISHED.value, Word.OUTSIDE, 0.5), (Outcome.STEP_TOO_SMALL.value, Word.WITHIN, np.nan)]
     told = in_words(runs(good, *bad, ("skipped", Word.WITHIN, np.nan)))
-    assert told.startswith("1 of 3 runs end at their horizon and within their limits; not 2 of e:p: ")
+    assert told.startswith("1 of 3 runs end at their horizon and within their limits; the others are 2 of e:p (")
     assert "outside 1" in told
     assert Outcome.STEP_TOO_SMALL.value in told
     assert "largest relative error is 0.5" in told

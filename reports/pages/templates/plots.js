@@ -31,7 +31,7 @@
       out.margin = { ...out.margin, l: 58, r: 6, t: out.showlegend === false ? (out.annotations?.length ? 24 : 10) : out.margin.t }; // no buttons there
       out.font = { ...out.font, size: 10 };
       for (const key of axes(out)) {
-        if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], dtick: undefined, nticks: 6 };
+        if (key[0] === "x" && out[key].type === "log") out[key] = { ...out[key], nticks: Math.min(6, out[key].nticks ?? 6) };
         if (key[0] === "y") out[key].title = { ...out[key].title, standoff: 4 };
       }
     }
