@@ -13,6 +13,7 @@ from friction_scenes import HALF, Joint, RowLaw, Scene, Shape, account, box_body
 from crossbody.cases import Outcome, Trajectory
 
 DEEP, T_END = 0.01, 0.5
+QUICK = (*range(12), 38, 40, 179)  # of the last three rounding had one corner bear the upper box where the lower lands
 
 
 def two(mu: float, masses: tuple[float, float], law: RowLaw) -> Scene:
@@ -42,7 +43,7 @@ def test_level_boxes_land(mu: float, rtol: float) -> None:
     assert account(motion) < 1e3 * rtol
 
 
-@pytest.mark.parametrize("seed", [*range(12), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(12, 200))])
+@pytest.mark.parametrize("seed", [pytest.param(k, marks=() if k in QUICK else pytest.mark.slow) for k in range(200)])
 def test_level_boxes_of_any_weight_land(seed: int) -> None:
     rng = np.random.default_rng(seed)
     law = RowLaw(a0=float(10 ** rng.uniform(3.5, 4.5)), a1=float(rng.uniform(5.0, 100.0)))
