@@ -15,7 +15,7 @@ from crossbody.reports.judging.judge_controls import blind
 from crossbody.reports.judging.run_verdicts import LARGEST_PARTS, Entry, unguarded, verdicts
 from crossbody.reports.judging.stored import judged_alike
 from crossbody.reports.judging.truth import truth_of
-from crossbody.reports.judging.truth_row import of_truth, truth_row
+from crossbody.reports.judging.truth_row import of_truth, touching, truth_row
 from crossbody.reports.judging.verdict import COLUMNS, Verdict, limit_for
 from crossbody.reports.measuring.alignment import expect
 from crossbody.reports.measuring.truth import Truth, shortened
@@ -70,9 +70,11 @@ def judged(
     trusted = shortened(truth)
     begun = [entry.engine for entry in entries if entry.run is not None and len(entry.run.t) > 1]
     rows = [row for entry in entries for row in verdicts(case, entry, trusted, command, begin)]
+    others = [entry.run for entry in entries if entry.run is not None and entry.engine != "reference"]
     return [
         *rows,
         *truth_row(case, truth, command),
+        *touching(case, trusted, others, command),
         *_idle(case, rows, command),
         *blind(case, trusted, command, begun),
     ]

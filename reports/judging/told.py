@@ -10,6 +10,7 @@ from typing import Any
 
 from crossbody.reports.judging.parts import PARTS, SPLIT, part_of
 from crossbody.reports.judging.remedies import remedy
+from crossbody.reports.judging.truth_row import TOUCHING
 from crossbody.reports.judging.verdict import IDENTITIES, LACKS, UNMEASURED, Row, Word
 from crossbody.reports.layout import unit_text, valid
 from crossbody.reports.measuring.truth import TRUTH
@@ -163,6 +164,9 @@ def sentence(runs: Sequence[EngineRun]) -> str:
     told = (f"{one}. {does}" if does else one for one, does in zip(_caused(loose), remedies, strict=True))
     lines += _listed("Beyond, not judged", list(told))
     lines += _listed("Expected-outside, the largest", _caused(_largest(known)) if known else [])
+    lines += _listed(
+        "Mind", [row["why"].removesuffix(".") for one in runs for row in one.rows if row["metric"] == TOUCHING]
+    )
     lines += _listed("Without a limit", [f"{run.who} on {run.label}" for run in all_ran if not run.judged])
     return NEXT.join(lines)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from crossbody.cases import Case
+from crossbody.cases import Case, Trajectory
 from crossbody.cases.scene_contacts import turning
 from crossbody.reports.judging.stored import SAME_END, compared_until
 from crossbody.reports.judging.truth import GAINS, PARTED
@@ -95,6 +96,29 @@ def _whose(name: str) -> str:
     """Say of what a number is: of the second source, or of what both tell of touches in another way."""
     both = name in (*GAINS, *GAINS.values())
     return f"The difference of its sources in {name}" if both else f"The {name} of its second source"
+
+
+TOUCHING = "touches (all engines)"  # the row that says that all engines touch otherwise than a truth does
+
+
+def touching(case: Case, truth: Truth, runs: Sequence[Trajectory], command: str) -> list[Verdict]:
+    """Say that none of a truth's contacts touches, but some of every engine's do, or the other way round.
+
+    Args:
+        case: the scene.
+        truth: up to where it is trusted.
+        runs: of engines that share nothing with the truth.
+        command: for the row.
+    """
+    ran = [run for run in runs if run.outcome.ok and len(run.t)]
+    if not (ran and case.law.touches.any()):
+        return []
+    does = bool(truth.contacts(truth.compared(truth.trajectory)))
+    if any(bool(truth.contacts(truth.compared(run))) == does for run in ran):
+        return []
+    none = "no contact of the truth touches, but some of every engine do"
+    said = "some contacts of the truth touch, but none of any engine does" if does else none
+    return [of_truth(case, TOUCHING, f"In {case.label} {said}.", command, verdict=Word.INFO)]
 
 
 def of_truth(case: Case, metric: str, why: str, command: str, **more: Any) -> Verdict:

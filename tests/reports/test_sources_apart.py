@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from friction_scenes import sphere_on_floor
 
-from crossbody.cases import Case, Trajectory
+from crossbody import engines
+from crossbody.cases import Case, Trajectory, load
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import RowLaw
 from crossbody.reports.judging import truth as judging
 from crossbody.reports.judging.told import runs_of, sentence
-from crossbody.reports.judging.truth_row import truth_row
+from crossbody.reports.judging.truth_row import touching, truth_row
 from crossbody.reports.judging.verdict import Word
 from crossbody.reports.measuring.scale import energy
 from crossbody.reports.measuring.truth import Truth
@@ -68,3 +69,18 @@ def test_a_source_that_tells_something_else_of_touches_is_no_witness(
     said = sentence(runs_of([row.row()]))
     assert f"The difference of its sources in {name} is" in said
     assert "times its limit" not in said
+
+
+@pytest.mark.parametrize("touches", [True, False])
+def test_engines_that_all_touch_where_the_truth_does_not_are_told(touches: bool) -> None:
+    case = load("bouncing_ball", "linear", t_end=1.0 if touches else 0.1)
+    truth = judging.truth_of(case)
+    run = engines.load("reference").prepare(load("bouncing_ball", "linear", t_end=1.0), "compiled").run()
+    none = replace(run, events=(), mode=np.zeros_like(run.mode))
+    early = replace(run, events=tuple(replace(one, t=0.01 * (1 + k)) for k, one in enumerate(run.events[:2])))
+    (row,) = touching(case, truth, [none, none] if touches else [early, early], "")
+    assert row.verdict == Word.INFO
+    said = {"engine": "mujoco", "profile": "matched", "metric": "position", "verdict": "within", "value": 0.0}
+    ran = row.row() | said | {"limit": 1.0}
+    assert ("none of any engine" if touches else "some of every engine") in sentence(runs_of([row.row(), ran]))
+    assert touching(case, truth, [none, early], "") == []
