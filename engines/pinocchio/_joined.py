@@ -23,6 +23,7 @@ from crossbody.engines.nearest import cross as crossed
 from crossbody.engines.pinocchio._contacts import carried, poses_of
 from crossbody.engines.pinocchio._rows import ROUNDING, Solve, pose
 
+PULLS = (ROUNDING, *10.0 ** np.arange(-12.0, 1.0))  # parts of the largest multiplier
 NO_SUCH = 1e-10  # residual below which inequalities have no solution
 DEPENDENT = 1e-7  # singular value of the rows, over the largest, that counts as zero
 NEAR = (1e-8, 1e-4)  # what a row adds to the others, over the first: below it follows, above it holds by itself
@@ -319,24 +320,35 @@ def none_pulling(lam: Floats, J: Floats, one_sided: Sequence[bool]) -> Floats:
         one_sided: which of them may not pull.
 
     Returns:
-        They (na,), or `lam` where there are none: rows have to let go.
+        They (na,). Where rows have to let go none is such: they pull by as little as they must, to a factor of ten, as
+        the instant at which they let go is where that begins.
     """
     _, s, Vt = np.linalg.svd(J.T)
     free = Vt[int((s > DEPENDENT * s[0]).sum()) :].T  # what multipliers may change by without another force
     # The multiplier of a row that none of these has is unique: it may be as small as it likes beside the others.
     pushing = np.asarray(one_sided) & (np.abs(free).max(axis=1, initial=0.0) > DEPENDENT)
     least = lam - free @ (free.T @ lam)
-    G, h = free[pushing], -least[pushing] - ROUNDING * np.abs(least).max(initial=0.0)
+    largest = float(np.abs(least).max(initial=0.0))
+    for pull in PULLS:
+        shifted = _at_least(-pull * largest, least, free, pushing)
+        if shifted is not None:
+            shifted[pushing] = np.maximum(shifted[pushing], (ROUNDING - pull) * largest)
+            return shifted
+    return lam
+
+
+def _at_least(bound: float, least: Floats, free: Floats, pushing: Floats) -> Floats | None:
+    """Return the multipliers (na,) nearest to the least ones with those that push at a bound or above, if any are."""
+    G, h = free[pushing], bound - least[pushing]
     size = float(h.max(initial=0.0))
     if size <= 0.0:
-        return lam
+        return least
     E, target = np.vstack([G.T, h / size]), np.append(np.zeros(free.shape[1]), 1.0)
     from scipy.optimize import nnls  # which takes longer to import than most runs
 
     found, off = nnls(E, target)  # the least x with G x >= h: Lawson and Hanson 1974, ch. 23
     if off < NO_SUCH:
-        return lam
+        return None
     tight = found > 0.0  # to rounding, where nnls is to a tolerance
     shifted: Floats = least + free @ np.linalg.lstsq(G[tight], h[tight], rcond=DEPENDENT)[0]
-    shifted[pushing] = np.maximum(shifted[pushing], 0.0)
     return shifted

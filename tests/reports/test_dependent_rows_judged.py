@@ -131,6 +131,20 @@ def test_multipliers_that_do_not_pull_exert_the_same_forces(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(100))
+def test_rows_that_must_let_go_pull_by_no_more_than_they_must(seed: int) -> None:
+    """Corners of a box on a floor whose load has left their rectangle by a part of itself: that is all that pulls."""
+    rng = np.random.default_rng(seed)
+    x, y = (part.ravel() for part in np.meshgrid([-1.0, 1.0], [-1.0, 1.0]))
+    J = np.stack([np.ones(4), *(x, y)], axis=1) @ np.diag(rng.uniform(0.1, 10.0, 3))
+    beyond = 10.0 ** rng.uniform(-11.0, -1.0)
+    at = rng.uniform(-0.9, 0.9)
+    weights = 0.25 * (1.0 + (1.0 + beyond) * x + at * y)  # of the least norm: two pull, one of them by the other
+    found = none_pulling(weights, J, np.ones(4, dtype=bool))
+    assert np.abs(J.T @ (found - weights)).max() <= 1e-9 * np.abs(J.T @ weights).max()
+    assert -10.0 * beyond <= found.min() < 0.0
+
+
+@pytest.mark.parametrize("seed", range(100))
 def test_rows_that_rounding_has_pull_leave_the_others_as_they_are(seed: int) -> None:
     """Heels and toes of two feet that stand alike, and two joints at bounds that bear nothing."""
     rng = np.random.default_rng(seed)
