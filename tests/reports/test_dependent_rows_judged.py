@@ -14,8 +14,9 @@ from crossbody.cases.contacts import contacts
 from crossbody.cases.scene import Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.engines.pinocchio._joined import none_pulling
 from crossbody.reports import metrics
+from crossbody.reports.judging.truth import with_both_sides
 from crossbody.reports.measuring.modes import violated
-from crossbody.reports.measuring.truth import from_run
+from crossbody.reports.measuring.truth import from_run, sample_times
 
 RTOL = 1e-9
 
@@ -159,3 +160,51 @@ def test_rows_that_rounding_has_pull_leave_the_others_as_they_are(seed: int) -> 
     lam = np.array([-7e-15, -1e-14, heel, toe, heel, toe])
     found = none_pulling(lam, J, np.ones(6, dtype=bool))
     assert np.abs(J.T @ (found - lam)).max() <= 1e-11 * np.abs(J.T @ lam).max()
+
+
+ROCKING = (3, 11, 15, 16, 18, 24)
+"""Seeds with which one of four corners begins to bear nothing."""
+
+
+def rocking(seed: int) -> Case:
+    """A box that falls on a floor without friction, and rocks until its load leaves one corner after the other."""
+    rng = np.random.default_rng(seed)
+    x, y, z = np.array([0.1, 0.08, 0.06]) ** 2 / 3.0
+    box = Body(name="box", mass=1.0, inertia=(y + z, x + z, x + y, 0.0, 0.0, 0.0))
+    shapes = (
+        Shape(name="floor", type="plane"),
+        Shape(name="crate", body="box", type="box", size=(0.1, 0.08, 0.06)),
+    )
+    scene = Scene(
+        bodies=(box,), joints=(Joint(name="loose", body="box", type="free"),), shapes=shapes,
+        pairs=(Pair(name="touch", first="floor", second="crate", law=RowLaw(a0=4000.0, a1=100.0)),),
+    )  # fmt: skip
+    tilt = np.array([0.17, 0.08]) + rng.uniform(-0.03, 0.03, 2)
+    q0 = np.array([0.0, 0.0, 0.3, np.sqrt(1.0 - tilt @ tilt), *tilt, 0.0])
+    turning = np.array([1.0, 2.0]) + rng.uniform(-0.3, 0.3, 2)
+    return cases.from_scene(scene, q0=q0, v0=np.array([0.3, 0.0, -0.5, *turning, 0.5]), t_end=0.3)
+
+
+def test_truths_show_both_sides_of_the_kinks_of_shared_loads() -> None:
+    """Where one of four corners begins to bear nothing, which is no event: splines across it were off by 1e-3 N."""
+    for seed in ROCKING:
+        run = engines.load("reference").prepare(rocking(seed), "compiled").run()
+        kinks = np.setdiff1d(run.t[1:][np.diff(run.t) == 0.0], [event.t for event in run.events])
+        times = sample_times(run, 0.3)
+        assert len(kinks)
+        assert all(np.count_nonzero(times == kink) == 2 for kink in kinks)
+
+
+@pytest.mark.parametrize("profile", ["mujoco:matched", "pinocchio:law"])
+@pytest.mark.parametrize("seed", ROCKING)
+def test_a_load_that_goes_from_corner_to_corner_accuses_nobody(seed: int, profile: str) -> None:
+    case, (name, way) = rocking(seed), profile.split(":")
+    first = engines.load("reference").prepare(case, "compiled", rtol=1e-12).run()
+    dense = engines.load("reference").prepare(case, "compiled", rtol=1e-12, samples=sample_times(first, 0.3)).run()
+    truth = replace(from_run(with_both_sides(dense, first), Tier.D, "tight"), joined=True, touches=case.law.touches)
+    run = engines.load(name).prepare(case, way).run()
+    assert run.outcome.ok
+    for metric, limit in (("complementarity", 1e-6), ("event_times", 1e-5 * 0.3)):
+        off = metrics.load(metric).measure(truth, run, case)
+        assert off is not None
+        assert off <= limit, metric
