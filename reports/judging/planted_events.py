@@ -30,6 +30,8 @@ from crossbody.reports.measuring.truth import taken
 
 HAIR = 1e-7
 """Gap at a touch, m, that no tolerance leaves, and that is less than what joins two touches."""
+SEEN = 3e-6
+"""Part of a row's longest way between samples: beyond the limits of those who locate events, at any density of these."""
 
 
 def counts(plain: Plain) -> Iterator[Control]:
@@ -112,7 +114,8 @@ def touches(plain: Plain) -> Iterator[Control]:
         high = float(np.interp(event.t - off, run.t, gap))
         if sum(e.t == event.t for e in run.events) > 1 or high < FAR * float(gap.max()):
             continue
-        hair = HAIR * max(1.0, float(np.max(np.abs(run.q)))) * off / high
+        long = max(HAIR * max(1.0, float(np.max(np.abs(run.q)))), SEEN * float(np.max(np.abs(np.diff(gap)))))
+        hair = long * off / high
         for early, more in ((off, {"event_times": exactly(off)}), (hair, {})):
             if early <= off:
                 sees: dict[str, Range] = {"event_gap": _left(run, event, early), **more}
