@@ -31,7 +31,7 @@ from crossbody.reports.measuring.truth import taken
 HAIR = 1e-7
 """Gap at a touch, m, that no tolerance leaves, and that is less than what joins two touches."""
 SEEN = 3e-6
-"""Part of a row's longest way between samples: beyond the limits of those who locate events, at any density of these."""
+"""Part of a row's longest way between samples that is beyond the limits of those who locate events."""
 
 
 def counts(plain: Plain) -> Iterator[Control]:

@@ -288,3 +288,11 @@ def test_no_control_is_blind_over_a_horizon_that_a_parameter_has_made_longer(var
     case = cases.load("newtons_cradle", variant, zeta=zeta)
     told = [(row.metric, row.why) for row in judge_controls.blind(case, shortened(truth_of(case)), "")]
     assert not [one for one in told if "control" in one[0]], told
+
+
+@pytest.mark.parametrize("t_end", [60.0, pytest.param(1500.0, marks=pytest.mark.slow)])
+def test_no_control_is_blind_where_bounces_have_few_samples(t_end: float) -> None:
+    """Where a ball moves far from sample to sample a touch that is early by a hair is early by little of that."""
+    case = cases.load("bouncing_ball", "linear", a0=11000.0, a1=0.0, t_end=t_end)
+    told = [(row.metric, row.why) for row in judge_controls.blind(case, shortened(truth_of(case)), "")]
+    assert not [one for one in told if "control" in one[0]], told
