@@ -19,6 +19,7 @@ from scipy import stats
 from crossbody import hw
 from crossbody.cases.arrays import Floats
 from crossbody.hw import Estimate
+from crossbody.hw.fitting import covariance
 from crossbody.hw.fitting.difference import Differences
 from crossbody.hw.fitting.doubts import SPAN
 from crossbody.hw.windows.window import windows
@@ -32,12 +33,14 @@ FLIES, HEIGHT, SPEED, GUESS, STILL = 0.64, 3.0, 4.0, 7.0, 12
 """Of the ball: s, m, m/s, m/s^2, and samples at its start that have no noise."""
 ASKED = 0.95
 """Part of all intervals that have the true value in them."""
+SCATTERS = 0.2
+"""By how much the correlation of 600 neighbours is another one than was drawn: five deviations, (1 - rho^2)/sqrt(n)."""
 
 
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which log, where it is another one."""
-    return unlike((_ball, _link), "identification", "a log that ends in")
+    return unlike((_ball, _link, _correlated), "identification", "a log that ends in")
 
 
 def _least_squares(J: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -101,7 +104,41 @@ def _link() -> Iterator[Within]:
     more = 1e-4 * known.DRAG
     drags = (known.turned(t, drag=known.DRAG + more) - known.turned(t, drag=known.DRAG - more)) / (2.0 * more)
     both = np.column_stack([J, drags])
-    covariance = np.linalg.inv(both.T @ both)
+    scatter = np.linalg.inv(both.T @ both)
     fit = hw.identify(log, "single_pendulum", ["I1", "k1"], parameters=given, restart=0.0, hold=0)
-    together = float(covariance[0, 3] / math.sqrt(covariance[0, 0] * covariance[3, 3]))
+    together = float(scatter[0, 3] / math.sqrt(scatter[0, 0] * scatter[3, 3]))
     yield "correlation of I1 and k1", "a link with noise", float(fit.correlation[0, 1]), together, CURVED
+
+
+def _correlated() -> Iterator[Within]:
+    """Yield the covariance, and correlation, of estimates from residuals that follow each other by a known part.
+
+    Of two windows of noise with V_ij = rho^|i - j| in each, and weights L: that is L' V L times the noise's variance.
+    """
+    draw, count, rho = np.random.default_rng(21), 300, 0.6
+    gaps = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    V = np.kron(np.eye(2), rho**gaps)
+    noise = np.linalg.cholesky(V) @ draw.normal(size=2 * count)
+    t = np.tile(np.arange(count) / count, 2)
+    Q, R = np.linalg.qr(np.stack([np.ones(2 * count), t, t * t], axis=1))
+    L = Q @ np.linalg.inv(R).T
+    residual = noise - Q @ (Q.T @ noise)
+    found, told = covariance.scatter(Q, L, residual, covariance.Layout(samples=(count, count), k=1)), "noise that lasts"
+    V = np.kron(np.eye(2), found.correlation**gaps)
+    wanted = L.T @ V @ L
+    size = np.sqrt(np.diag(wanted))
+    of_estimates = found.covariance / np.outer(found.std, found.std)
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        yield "correlation", told, float(of_estimates[i, j]), float(wanted[i, j] / (size[i] * size[j])), 1e-9
+    yield "correlation of neighbours", told, found.correlation, rho, SCATTERS
+    place, each = (np.arange(count) + 0.5) / count, covariance.PARTS // 2
+    waves = np.kron(np.eye(2), np.cos(np.pi * np.outer(place, np.arange(each))) * np.sqrt([1.0, *[2.0] * (each - 1)]))
+    for i in range(3):
+        parts = L[:, i : i + 1] * waves / np.sqrt(each)
+        cut = parts - Q @ (Q.T @ parts)
+        known, A = float(np.sum((parts.T @ residual) ** 2)), cut.T @ V @ cut
+        std = math.sqrt(known * float(wanted[i, i]) / float(np.trace(A)))
+        yield "deviation", told, float(found.std[i]), std, 1e-9 * std
+        freedom = float(np.trace(A)) ** 2 / float(np.sum(A * A))
+        half = std * stats.t.ppf(0.5 + 0.5 * ASKED, freedom)
+        yield "half of an interval", told, float(found.half[i]), half, 1e-6 * std

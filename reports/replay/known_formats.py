@@ -54,6 +54,14 @@ def _mat(path: Path, data: Table) -> None:
     savemat(path, {"log": dict(data)}, do_compression=True)
 
 
+def _matrix(path: Path, data: Table, *, rows: bool) -> None:
+    """Write one matrix whose rows, or columns, are signals."""
+    from scipy.io import savemat
+
+    signals = np.stack([*data.values()])
+    savemat(path, {"M": signals if rows else signals.T})
+
+
 def _hdf5(path: Path, data: Table) -> None:
     import h5py
 
@@ -100,11 +108,14 @@ def _tdms(path: Path, data: Table) -> None:
 
 
 WRITERS: dict[str, tuple[str, Callable[[Path, Table], None], str]] = {
-    "log.csv": ("csv", _csv, ""), "log.parquet": ("pyarrow", _parquet, ""), "log.mat": ("scipy", _mat, "log."),
-    "log.h5": ("h5py", _hdf5, "rig/"), "log.mcap": ("mcap", _mcap, "/rig."), "log.bag": ("rosbags", _ros, "/rig."),
-    "log.tdms": ("nptdms", _tdms, "rig/"),
+    "log.csv": ("csv", _csv, "{name}"), "log.parquet": ("pyarrow", _parquet, "{name}"),
+    "log.mat": ("scipy", _mat, "log.{name}"), "log.h5": ("h5py", _hdf5, "rig/{name}"),
+    "wide.mat": ("scipy", partial(_matrix, rows=True), "M[{place}]"),
+    "tall.mat": ("scipy", partial(_matrix, rows=False), "M[{place}]"),
+    "log.mcap": ("mcap", _mcap, "/rig.{name}"), "log.bag": ("rosbags", _ros, "/rig.{name}"),
+    "log.tdms": ("nptdms", _tdms, "rig/{name}"),
 }  # fmt: skip
-"""File -> the library that writes it, what does, and what stands before the name of a column."""
+"""File -> the library that writes it, what does, and how it calls a column by its name or place in the table."""
 
 
 @cache
@@ -124,11 +135,11 @@ def _failed(name: str, why: str) -> Found:
 
 def _read(name: str) -> Iterator[Found]:
     """Yield the number of rows, and the first time and value, that are others than were written."""
-    _, write, before = WRITERS[name]
+    _, write, called = WRITERS[name]
     data = table()
+    t, angle = (called.format(name=one, place=i) for i, one in enumerate(data))
     columns = parse_columns(
-        f'[time]\ncolumn = "{before}t"\nunit = "s"\n'
-        f'[sensors.angle]\ncolumn = "{before}angle"\nunit = "mrad"\nscale = {SCALE}\n'
+        f'[time]\ncolumn = "{t}"\nunit = "s"\n[sensors.angle]\ncolumn = "{angle}"\nunit = "mrad"\nscale = {SCALE}\n'
     )
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder) / name, data)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from crossbody import hw
-from crossbody.cases import Outcome
+from crossbody.cases import EngineUnavailable, Outcome
 from crossbody.cases.arrays import Floats
 from crossbody.hw import Comparison, Log
 from crossbody.hw.models import load as load_model
@@ -265,6 +266,10 @@ def _link() -> Iterator[Within]:
     log = link_log()
     replayed = hw.replay(log, "single_pendulum", parameters=GIVEN, restart=0.6)
     yield "largest", "a replay of its own motion", _rows(replayed)["largest"], 0.0, 1e3 * CLOSE
+    for engine in ("mujoco:matched", "pinocchio:law"):  # in coordinates of their own
+        with suppress(EngineUnavailable):
+            other = hw.replay(log, "single_pendulum", parameters=GIVEN, restart=0.6, wanted=(engine,))
+            yield "largest", f"a replay of its own motion in {engine}", _rows(other)["largest"], 0.0, 1e3 * CLOSE
     more = GIVEN | {"I1": 1.4 * INERTIA, "k1": 0.7 * DRAG}
     fit = hw.identify(link_log(LATE), "single_pendulum", ["I1", "k1", "delay"], parameters=more, restart=1.2, hold=0)
     for name, wanted in (("I1", INERTIA), ("k1", DRAG), ("delay", LATE)):

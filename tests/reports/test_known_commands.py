@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from crossbody.cases import Case
 from crossbody.cases.errors import OwnFault
 from crossbody.cases.mechanisms.cradle import rules
+from crossbody.cases.scene import Scene
 from crossbody.hw.fitting import covariance, difference, doubts
+from crossbody.hw.models import _links
 from crossbody.hw.reading import repair
 from crossbody.hw.reading.plan import Source
 from crossbody.hw.replaying import measures
 from crossbody.reference.linear import LinearModel
+from crossbody.reports import described, known_described
 from crossbody.reports.analysis import known_analysis, numbers
 from crossbody.reports.bench import known_bench, measure
 from crossbody.reports.cli import cli
@@ -38,11 +43,12 @@ COMMANDS = {
     "stress": ("stress", "stiffness", "--runs", "1", "-q", "--out", "out"),
     "gapmap": ("gapmap", "--n", "2", "--points", "2", "-q", "--out", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
+    "list": ("list", "cart.xml"),
 }  # fmt: skip
 MODULES = {
     "replay": known_replay, "identify": known_fits, "doubts": known_doubts, "bench": known_bench,
     "analyse": known_analysis, "picture": known_pictures, "stress": known_sweep, "gapmap": known_maps,
-    "rules": known_rules,
+    "rules": known_rules, "list": known_described,
 }  # fmt: skip
 
 
@@ -67,12 +73,24 @@ def test_a_command_ends_where_an_answer_is_wrong(name: str, monkeypatch: pytest.
     assert not (tmp_path / "out").exists()
 
 
+HUNG = _links._hung
+
+
+def turned(case: Case) -> Scene:
+    """Links on hinges whose motors turn the other way."""
+    scene = HUNG(case)
+    return scene.replace(actuators=tuple(replace(one, gear=(1.0,)) for one in scene.actuators))
+
+
 CACHED = ("wrong", "link_log", "_hanging", "_flight")
 OFF: dict[str, tuple[Any, str, Any]] = {
     "replay": (measures, "bias", lambda y, yhat: float(np.mean(y - yhat))),
     "replay in a unit": (Source, "to_si", lambda source, raw: source.conversion.apply(raw)),
     "replay without repairs": (repair, "GAP", 9.0),
     "identify with intervals": (covariance, "LEVEL", 0.8),
+    "identify from noise that lasts": (covariance, "_through", lambda X, rho, series: X),
+    "list": (described, "_of_scene", lambda case: {}),
+    "replay by motors": (_links, "_hung", turned),
     "doubts of halves": (doubts, "FEWEST", 1000),
     "identify with steps": (difference, "STEP", 1e-13),
     "bench": (measure, "NATIVE", 1),
