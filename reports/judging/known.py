@@ -45,7 +45,7 @@ COMPILES = "reference"
 OF_COMMANDS = {
     "replay": (
         "replay.known_logs", "replay.known_replay", "replay.known_fits", "replay.known_doubts", "replay.known_formats",
-    ), "log": ("replay.known_logs",), "list": ("known_described",),
+    ), "log": ("replay.known_logs", "replay.known_formats"), "list": ("known_described",),
     "bench": ("bench.known_bench",),
     "analyse": ("analysis.known_analysis",), "picture": ("pages.known_pictures",),
     "stress": ("sweep.known_sweep",), "gapmap": ("maps.known_maps", "maps.known_rules"),

@@ -19,6 +19,8 @@ from crossbody.reports.judging.asked import Asked, Found, unlike_by
 
 EXACT = 1e-10
 SEED = 37
+PEAK = 1.0 + 9.0 / 16.0
+"""Where a parabola is highest, between samples: at one of sixteen instants that are looked at there."""
 FREE, CONTACT, COLLISION, BALLISTIC = Mode.FREE, Mode.CONTACT, Mode.COLLISION, Mode.BALLISTIC
 Way = tuple[tuple[float, Mode], ...]
 """Instants, s, and the modes from then on; free before."""
@@ -99,6 +101,10 @@ def _signals() -> Iterator[Asked]:
     yield "multipliers", "a run that tells none", float(multipliers(unknown) is None), 1.0
     every = multipliers(replace(run, lam=np.column_stack([3.0 - 2.0 * t, t])))
     yield "multipliers", "a line", np.inf if every is None else float(np.ptp(every[:, 0])), float(np.ptp(2.0 * t))
+    t = np.arange(4.0)
+    bend = 1.0 - (t[:, None] - PEAK) ** 2
+    risen = multipliers(_run(t, bend, np.ones((4, 1)), bend))
+    yield "largest multiplier", "a parabola", np.inf if risen is None else float(risen.max()), 1.0
 
 
 def _lines() -> Iterator[Asked]:
