@@ -14,6 +14,7 @@ from crossbody.reference.cache import compiled
 from crossbody.reference.kinds import Array, Bytes, Floats, Index
 
 ULP = 2.3e-16
+ROUNDING = 1e-13  # part of the largest term of a sum that rounding may make of the sum
 RANK = 1e-14  # a pivot below this part of its diagonal is a lost rank
 DEPENDENT = 1e-10  # a pivot below it is that of a row which depends on the rows before, where that may be
 

@@ -12,13 +12,12 @@ import numpy as np
 
 from crossbody.reference.cache import compiled
 from crossbody.reference.core.acceleration import GENERAL, accelerate, law_of, pushed, weigh
-from crossbody.reference.core.algebra import ULP, copy
+from crossbody.reference.core.algebra import ROUNDING, ULP, copy
 from crossbody.reference.core.dop853 import OPEN
 from crossbody.reference.core.friction import is_shared
 from crossbody.reference.core.journal import blame
 from crossbody.reference.core.layout import INCONSISTENT, NOT_FINITE, Buffers, Model, Work
 from crossbody.reference.core.loops import bears_nothing
-from crossbody.reference.core.machine import ROUNDING
 from crossbody.reference.core.unknowns import row_size
 from crossbody.reference.kinds import Bytes
 

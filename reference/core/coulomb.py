@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core.algebra import ROUNDING
 from crossbody.reference.core.complete import factor_complete, largest_left, solve_complete
 from crossbody.reference.core.directions import take_directions
 from crossbody.reference.core.friction import has_friction, is_dry
@@ -269,8 +270,10 @@ def _apart(s: Any, w: Work, la: Array) -> float:
     most = 0.0
     for a in range(s.normals):
         j = w.unknown[a]
-        total = -w.r[j]
+        total, size = -w.r[j], 0.0
         for c in range(s.na):
-            total += w.gram[j, c] * la[c]
-        most = max(most, abs(total) / w.allowed[j] if total != 0.0 else 0.0)
+            part = w.gram[j, c] * la[c]
+            total += part
+            size += abs(part)
+        most = max(most, abs(total) / (w.allowed[j] + ROUNDING * size) if total != 0.0 else 0.0)
     return float(most)

@@ -27,10 +27,10 @@ from crossbody.reference.core.acceleration import (
     pushed,
     weigh,
 )
-from crossbody.reference.core.algebra import DEPENDENT, RANK
+from crossbody.reference.core.algebra import DEPENDENT, RANK, ROUNDING
 from crossbody.reference.core.journal import move
 from crossbody.reference.core.layout import ILL_POSED, Buffers, Model, Work
-from crossbody.reference.core.machine import ROUNDING, noise, released_mode
+from crossbody.reference.core.machine import noise, released_mode
 from crossbody.reference.core.shares import allow, solve_dependent
 
 MOVED = np.int64(1)  # rows have let go

@@ -27,7 +27,7 @@ from crossbody.reference.core.acceleration import (
     scatter,
     weigh,
 )
-from crossbody.reference.core.algebra import ULP, all_finite, copy, inverse_diagonal, solve_mass, solve_schur
+from crossbody.reference.core.algebra import ROUNDING, ULP, all_finite, copy, inverse_diagonal, solve_mass, solve_schur
 from crossbody.reference.core.dop853 import START, derivative
 from crossbody.reference.core.friction import STANDS, ask, decided_to, has_friction
 from crossbody.reference.core.layout import (
@@ -52,7 +52,6 @@ from crossbody.reference.kinds import Bytes, Floats
 
 SLOW = 1e-9  # part of the largest rate seen
 DEEP = 1e-9  # m: a FREE gap below -DEEP, and below what it is known to, was started in penetration
-ROUNDING = 1e-13
 TOUCHING = 64.0 * ULP  # of the largest coordinate, or of 1: a gap below it is closed as far as rounding tells
 LIFTED = 1e-3  # of a row's time scale, for which one that was lifted off cannot be told from one that is held
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from crossbody.reference.cache import compiled
+from crossbody.reference.core.algebra import ROUNDING
 from crossbody.reference.core.coulomb import factor_set, solve
 from crossbody.reference.core.friction import has_friction, is_decided, is_dry, most_drift, slip, small_slip
 from crossbody.reference.core.jams import JAMMED, determinant
@@ -129,8 +130,10 @@ def apart(s: Any, w: Work) -> float:
     allow(s, w, w.y[: s.nq], w.y[s.nq :])
     most = 0.0
     for a in range(s.normals):
-        j = w.unknown[a]
-        most = max(most, abs(w.excess[j]) / w.allowed[j] if w.excess[j] != 0.0 else 0.0)
+        j, size = w.unknown[a], 0.0
+        for c in range(s.na):
+            size += abs(w.gram[j, c] * w.load[c])
+        most = max(most, abs(w.excess[j]) / (w.allowed[j] + ROUNDING * size) if w.excess[j] != 0.0 else 0.0)
     return float(most)
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 DEPENDENT = 1e-10  # singular value over the largest, below which rows depend on each other
 Flags = NDArray[np.bool_]
+ROUNDED = 1e-13  # part of its largest terms by which a sum of what multipliers do to a row may be off
 LIGHT, SHARINGS = 1e-12, 3  # least part of the largest bound, and times that loads are shared anew
 MOST = 400  # projections between loads that hold and loads that can be borne
 
@@ -179,8 +180,8 @@ class Balance:
         """By how many times what is allowed the normal rows that are solved for are off their laws under lam (m,)."""
         places = self.unknowns.places[: self.unknowns.count]
         off = np.abs(_times(self.seen.G, lam) - self.seen.bare - self.seen.pull)
-        tiny = np.finfo(float).tiny
-        most: Floats = (off / np.maximum(self.seen.allowed, tiny))[..., places].max(axis=-1, initial=0.0)
+        known = self.seen.allowed + ROUNDED * _times(np.abs(self.seen.G), np.abs(lam)) + np.finfo(float).tiny
+        most: Floats = (off / known)[..., places].max(axis=-1, initial=0.0)
         return most
 
     def _exceeds(self, x: Floats) -> Flags:
