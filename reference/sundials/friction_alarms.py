@@ -32,7 +32,7 @@ def alarms(machine: FrictionMachine, guards: int) -> list[Alarm]:
     """List what may fire until the next event, in the order of `values`; `guards` are those of the mechanism."""
     told = list[tuple[int, str, bool]]()
     for i in machine.rows:
-        told += [(i, tells, True) for tells in _told(machine.modes[i], i in machine.sliding.dry)]
+        told += [(i, tells, i not in machine.flush) for tells in _told(machine.modes[i], i in machine.sliding.dry)]
     if len(pressing := machine.contacts()) > 1:
         told.append((pressing[0], "PART", True))
     told += [(k, "WATCH", False) for k in range(guards)]

@@ -49,6 +49,7 @@ class FrictionMachine(LevelMachine):
         self.begun: set[int] = set()
         self.courses: dict[int, Floats] = {}  # directions of slips where these were last clear of zero
         self.alarms: list[Alarm] = []
+        self.flush: set[int] = set()  # open contacts at their surface by rounding: they touch once they have risen
         self.modes = [Mode(mode) for mode in initial_modes(system, *start).tolist()]
         self.rows = sorted({*self.rows, *self.sliding.dry})
         self._joining, self._stops, self._begins = set(self.sliding.dry), set[int](), dict[int, Floats]()
@@ -184,6 +185,7 @@ class FrictionMachine(LevelMachine):
         self._jams = False
         self.redundant = self.sliding.redundant
         vd, lam = self.accelerate(t, q, v)
+        self.flush = {i for i in self.rows if self.modes[i] == Mode.FREE and gap[i] <= 0.0}
         self.alarms = alarms(self, self.guards_watched)
         none = np.zeros(len(lam))
         return View(gap, rate, vd, lam, none, none, lam)
