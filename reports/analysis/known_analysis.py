@@ -23,7 +23,7 @@ import pandas as pd
 from crossbody import cases
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
-from crossbody.cases.scene import Actuator, Body, Joint, Scene
+from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape
 from crossbody.engines.linear import Tangent
 from crossbody.reference.linear import LinearModel
 from crossbody.reports.analysis import bode, numbers
@@ -35,7 +35,7 @@ from crossbody.reports.analysis.summary import MOVES, NEUTRAL, STABLE, UNSTABLE,
 from crossbody.reports.judging.asked import Asked, Found, unlike_by
 from crossbody.reports.judging.verdict import Word
 
-MASS, SPRING, DRAG, GRAVITY, GEAR = 1.5, 60.0, 3.0, 9.81, 0.7
+MASS, SPRING, DRAG, GRAVITY, GEAR, LAG = 1.5, 60.0, 3.0, 9.81, 0.7, 0.2
 """Of a weight on a spring, SI."""
 EXACT, SOLVED, SEARCHED = 1e-9, 1e-7, 1e-5
 """Part of a number by which sums in another order differ, to which equations are solved and differentiated, and to
@@ -46,7 +46,7 @@ OMEGA = np.array([0.1, 3.0, 6.2, 6.5, 40.0, 900.0])
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    kinds = (_weight, _responses, _ranks, _poles, _words, _loci, _curves, _engines, _ball, _chain)
+    kinds = (_weight, _responses, _ranks, _poles, _words, _loci, _curves, _engines, _ball, _chain, _filtered, _stuck)
     return unlike_by(kinds, "analysis", "a model that ends in", SOLVED, 1e-3)
 
 
@@ -263,3 +263,37 @@ def _chain() -> Iterator[Asked]:
     found = places(case_of(made, name="made_up", t_end=0.01))
     yield "equilibria", "a chain", float(len(found)), 1.0
     yield from _of_engines(found, "a chain")
+
+
+def _filtered() -> Iterator[Asked]:
+    """Yield the response of the weight to a motor behind a filter: that of both, one after the other."""
+    motor = Actuator(name="motor", joint="z", gear=(GEAR,), activation="filter", time_constant=LAG)
+    case = _hanging().case
+    assert case.scene is not None
+    lagged = case_of(case.scene.replace(actuators=(motor,)), name="made_up", q0=case.q0, t_end=0.01)
+    rows = numbers.responses(places(lagged), OMEGA)
+    own = rows[rows["output"] == "z"]
+    wanted = GEAR / (1.0 + 1j * LAG * OMEGA) / (SPRING - MASS * OMEGA**2 + 1j * DRAG * OMEGA)
+    for k, w in enumerate(OMEGA):
+        yield "magnitude", f"a filter at {w:g} rad/s", float(own["magnitude"].iloc[k]), float(abs(wanted[k]))
+
+
+def _stuck() -> Iterator[Asked]:
+    """Yield the poles of a ball on slides that friction holds: its gap by its law, its slip by a1."""
+    law = RowLaw(a0=100.0, a1=30.0)
+    scene = Scene(
+        bodies=(Body(name="ball", mass=MASS, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),),
+        joints=tuple(Joint(name=k, body="ball", type="slide", axis=axis)
+                     for k, axis in (("x", (1.0, 0.0, 0.0)), ("z", (0.0, 0.0, 1.0)))),
+        shapes=(Shape(name="floor", type="plane"), Shape(name="ball", body="ball", size=(0.1, 0.0, 0.0))),
+        pairs=(Pair(name="stands", first="floor", second="ball", dimension=3, friction=(0.5, 0.5, 0.0, 0.0, 0.0),
+                    law=law),),
+        gravity=(0.0, 0.0, -GRAVITY),
+    )  # fmt: skip
+    found = numbers.poles(places(case_of(scene, name="made_up", q0=[0.0, 0.1], t_end=0.01)))
+    root = math.sqrt(0.25 * law.a1**2 - law.a0)
+    wanted = sorted((0.0, -law.a1, -0.5 * law.a1 - root, -0.5 * law.a1 + root))
+    poles = sorted(found["real"].tolist())
+    yield "poles", "a ball that sticks", float(len(poles)), 4.0
+    for one, must in zip(poles, wanted, strict=False):
+        yield "real", "a ball that sticks", one, must
