@@ -70,12 +70,12 @@ def list_(name: str | None, plain: bool) -> None:
     """
     from crossbody.reports import described
 
+    with pure() if plain else nullcontext():
+        told = described.everything() if name is None else described.one(name)
     if name is not None and Path(name).suffix:  # a file
         from crossbody.reports.commands.shared import check_answers
 
         check_answers("list")
-    with pure() if plain else nullcontext():
-        told = described.everything() if name is None else described.one(name)
     click.echo(json.dumps({k.lower(): v for k, v in told.items()}, indent=1) if plain else described.text(told))
 
 

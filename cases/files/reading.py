@@ -6,11 +6,12 @@ bodies than a scene.
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
-from crossbody.cases.errors import InvalidValue, NoFile, SceneError
+from crossbody.cases.errors import EngineUnavailable, InvalidValue, NoFile, SceneError
 from crossbody.cases.files.without import strip
 from crossbody.cases.regular import open_regular
 from crossbody.cases.scene import LARGEST, Scene
@@ -27,11 +28,20 @@ BODIES = ("body", "link")
 
 
 def existing(path: Path) -> Path:
-    """Return the path of a robot file."""
+    """Return the path of a robot file.
+
+    Raises:
+        EngineUnavailable: where MuJoCo, whose compiler reads robot files, is not installed.
+    """
     if not path.is_file():
         raise NoFile("robot file", path)
     if path.suffix not in SUFFIXES:
         raise InvalidValue(f"The robot file {path} ends in {path.suffix!r}; valid: {', '.join(SUFFIXES)}.")
+    if find_spec("mujoco") is None:
+        raise EngineUnavailable(
+            f"The robot file {path} is read by the compiler of the package 'mujoco', which is not installed; install "
+            "it with: pip install 'crossbody[mujoco]'"
+        )
     return path
 
 

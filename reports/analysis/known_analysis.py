@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from crossbody import cases
+from crossbody import cases, engines
 from crossbody.cases.arrays import Floats
 from crossbody.cases.files.case import case_of
 from crossbody.cases.scene import Actuator, Body, Joint, Pair, RowLaw, Scene, Shape
@@ -225,8 +225,12 @@ def _words() -> Iterator[Asked]:
 
 
 def _of_engines(found: tuple[Place, ...], what: str) -> Iterator[Asked]:
-    """Yield 1 for each way of an engine whose linear model is another one, or is not told, else 0."""
+    """Yield 1 for each way of an installed engine whose linear model is another one, or is not told, else 0."""
     for row in _rows(counterparts(found)[0]):
+        try:
+            engines.load(str(row["engine"]).partition(":")[0])
+        except cases.EngineUnavailable:
+            continue
         wrong_ = row["verdict"] not in (Word.WITHIN.value, Word.EXPECTED.value)
         yield "engine", f"{row['engine']}, {row['way']}, of {what}", float(wrong_), 0.0
 

@@ -6,7 +6,7 @@ MEANS = {
     "fit": "share of the measured motion that is explained: 100 at best, 0 as far off as its mean, below 0 farther",
     "rmse": "root mean square of measured minus predicted",
     "largest": "largest of measured minus predicted",
-    "bias": "mean of measured minus predicted",
+    "bias": "mean of predicted minus measured",
     "delay": "how much later the measurement is than the prediction",
     "noise": "of the measurement, one standard deviation",
     "unexplained": "rmse without the noise",
