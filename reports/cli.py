@@ -470,6 +470,9 @@ def _obey(arguments: list[str] | None) -> int:
         sys.stdout.flush()  # what cannot be written is reported, not lost with the process
     except (click.exceptions.Abort, KeyboardInterrupt):
         return 130
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.ctx.get_help() if error.ctx else error.format_message(), err=True)
+        return 2
     except click.ClickException as error:
         return _say(error.format_message())
     except (Exception, SystemExit) as error:

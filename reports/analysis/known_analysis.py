@@ -40,13 +40,29 @@ MASS, SPRING, DRAG, GRAVITY, GEAR, LAG = 1.5, 60.0, 3.0, 9.81, 0.7, 0.2
 EXACT, SOLVED, SEARCHED = 1e-9, 1e-7, 1e-5
 """Part of a number by which sums in another order differ, to which equations are solved and differentiated, and to
 which steps are searched for."""
+LAW, MU, SPEED = RowLaw(a0=100.0, a1=30.0), 0.5, 2.0
+"""Of a ball on a floor; its speed where it slides, m/s."""
 OMEGA = np.array([0.1, 3.0, 6.2, 6.5, 40.0, 900.0])
 
 
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    kinds = (_weight, _responses, _ranks, _poles, _words, _loci, _curves, _engines, _ball, _chain, _filtered, _stuck)
+    kinds = (
+        _weight,
+        _responses,
+        _ranks,
+        _poles,
+        _words,
+        _loci,
+        _curves,
+        _engines,
+        _ball,
+        _chain,
+        _filtered,
+        _stuck,
+        _slid,
+    )
     return unlike_by(kinds, "analysis", "a model that ends in", SOLVED, 1e-3)
 
 
@@ -275,29 +291,48 @@ def _filtered() -> Iterator[Asked]:
     case = _hanging().case
     assert case.scene is not None
     lagged = case_of(case.scene.replace(actuators=(motor,)), name="made_up", q0=case.q0, t_end=0.01)
-    rows = numbers.responses(places(lagged), OMEGA)
+    found = places(lagged)
+    yield "filter", "a weight behind a filter", float(np.abs(numbers.poles(found)["real"] + 1.0 / LAG).min()), 0.0
+    rows = numbers.responses(found, OMEGA)
     own = rows[rows["output"] == "z"]
     wanted = GEAR / (1.0 + 1j * LAG * OMEGA) / (SPRING - MASS * OMEGA**2 + 1j * DRAG * OMEGA)
     for k, w in enumerate(OMEGA):
         yield "magnitude", f"a filter at {w:g} rad/s", float(own["magnitude"].iloc[k]), float(abs(wanted[k]))
 
 
-def _stuck() -> Iterator[Asked]:
-    """Yield the poles of a ball on slides that friction holds: its gap by its law, its slip by a1."""
-    law = RowLaw(a0=100.0, a1=30.0)
+def _upon_floor(ways: str, speed: float) -> list[float]:
+    """Return the poles, 1/s, rising, of a ball on slides that stands on a floor, or moves along x on it, m/s."""
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     scene = Scene(
         bodies=(Body(name="ball", mass=MASS, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)),),
-        joints=tuple(Joint(name=k, body="ball", type="slide", axis=axis)
-                     for k, axis in (("x", (1.0, 0.0, 0.0)), ("z", (0.0, 0.0, 1.0)))),
+        joints=tuple(Joint(name=k, body="ball", type="slide", axis=axes[k]) for k in ways),
         shapes=(Shape(name="floor", type="plane"), Shape(name="ball", body="ball", size=(0.1, 0.0, 0.0))),
-        pairs=(Pair(name="stands", first="floor", second="ball", dimension=3, friction=(0.5, 0.5, 0.0, 0.0, 0.0),
-                    law=law),),
+        pairs=(Pair(name="stands", first="floor", second="ball", dimension=3, friction=(MU, MU, 0.0, 0.0, 0.0),
+                    law=LAW),),
         gravity=(0.0, 0.0, -GRAVITY),
     )  # fmt: skip
-    found = numbers.poles(places(case_of(scene, name="made_up", q0=[0.0, 0.1], t_end=0.01)))
-    root = math.sqrt(0.25 * law.a1**2 - law.a0)
-    wanted = sorted((0.0, -law.a1, -0.5 * law.a1 - root, -0.5 * law.a1 + root))
-    poles = sorted(found["real"].tolist())
-    yield "poles", "a ball that sticks", float(len(poles)), 4.0
+    q0, v0 = np.zeros((2, len(ways)))
+    q0[-1], v0[0] = 0.1, speed
+    found: list[float] = numbers.poles(places(case_of(scene, name="made_up", q0=q0, v0=v0, t_end=0.01)))[
+        "real"
+    ].tolist()
+    return sorted(found)
+
+
+def _stuck() -> Iterator[Asked]:
+    """Yield the poles of a ball on slides that friction holds: its gap by its law, its slip by a1."""
+    yield from _of_gap("a ball that sticks", _upon_floor("xz", 0.0), -LAW.a1, 0.0)
+
+
+def _slid() -> Iterator[Asked]:
+    """Yield those of one that slides along x: its speed across falls by mu g / v, and along by no part of itself."""
+    yield from _of_gap("a ball that slides", _upon_floor("xyz", SPEED), -MU * GRAVITY / SPEED, 0.0, 0.0, 0.0)
+
+
+def _of_gap(what: str, poles: list[float], *others: float) -> Iterator[Asked]:
+    """Yield poles, 1/s, that are those of a gap by its law and others."""
+    root = math.sqrt(0.25 * LAW.a1**2 - LAW.a0)
+    wanted = sorted((*others, -0.5 * LAW.a1 - root, -0.5 * LAW.a1 + root))
+    yield "poles", what, float(len(poles)), float(len(wanted))
     for one, must in zip(poles, wanted, strict=False):
-        yield "real", "a ball that sticks", one, must
+        yield "real", what, one, must

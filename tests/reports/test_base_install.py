@@ -40,3 +40,11 @@ def test_a_robot_file_names_the_package_that_reads_it(command: str, tmp_path: Pa
 def test_a_case_of_the_library_needs_none(words: tuple[str, ...], tmp_path: Path) -> None:
     found = ran(tmp_path, *words)
     assert found.returncode == 0, found.stderr
+
+
+@pytest.mark.parametrize("words", [(), ("log",)])
+def test_without_a_command_the_help_is_as_it_stands(words: tuple[str, ...], tmp_path: Path) -> None:
+    """It was one paragraph."""
+    bare, asked = ran(tmp_path, *words), ran(tmp_path, *words, "--help")
+    assert bare.returncode == 2
+    assert bare.stderr.split("\n") == asked.stdout.split("\n")
