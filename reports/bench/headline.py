@@ -86,8 +86,10 @@ def _ratios(ours: pd.DataFrame, rungs: pd.DataFrame) -> dict[str, Any]:
     done = rungs[np.isfinite(rungs["error"].astype(float))]
     if not len(done):
         return about | {"says": _failed(rungs.iloc[-1])}
-    levels = [_level(ours, rung) for rung in done.to_dict(orient="records")]
-    best = min(levels, key=lambda level: (level["best_error"], level["engine_ms"]))
+    rows = done.to_dict(orient="records")
+    levels = [_level(ours, rung) for rung in rows]
+    # Of errors that the truth does not tell apart the cheapest counts, of an engine as of the reference.
+    best = min(zip(rows, levels, strict=True), key=lambda pair: (_known(pair[0]), pair[1]["engine_ms"]))[1]
     least = min(levels, key=lambda level: (math.isfinite(level["ratio"]), _fair(level)))
     found = {
         "least_ratio": _fair(least),
@@ -111,9 +113,14 @@ def _failed(finest: pd.Series[Any]) -> str:
     return f"reaches no error: {at} its run ends {finest['outcome']}"
 
 
+def _known(rung: Mapping[Any, Any]) -> float:
+    """The error of a rung as far as that is known: not below rounding, nor below what the truth is known to."""
+    return max(float(rung["error"]), FLOOR, float(rung["known_to"]))
+
+
 def _level(ours: pd.DataFrame, rung: Mapping[Any, Any]) -> dict[str, Any]:
     """The reference's cheapest run at least as accurate as one rung, as far as that is known."""
-    error = max(float(rung["error"]), FLOOR, float(rung["known_to"]))
+    error = _known(rung)
     found = {
         "knob": rung["knob"], "setting": rung["setting"], "best_error": float(rung["error"]),
         "engine_ms": float(rung["median_ms"]), "ratio": math.nan, "interpreted": rung.get("interpreted", ""),

@@ -302,6 +302,14 @@ def test_errors_below_what_the_truth_is_known_to_are_alike() -> None:
     assert headline(rows.assign(known_to=2e-5))["ratio"][0] == 3.0
 
 
+def test_of_an_engine_too_the_cheapest_of_alike_errors_counts() -> None:
+    """The reference was given its cheapest one below what the truth is known to, an engine its smallest."""
+    rows = table(("reference", 1e-9, 1e-11, 1.0), ("other", 1e-3, 5e-11, 4.0), ("other", 1e-4, 1e-13, 40.0))
+    assert headline(rows)["best_error"][0] == 1e-13
+    fair = headline(rows.assign(known_to=1e-10)).iloc[0]
+    assert (fair["best_error"], fair["ratio"]) == (5e-11, 4.0)
+
+
 def test_an_error_that_the_reference_does_not_reach_is_said() -> None:
     found = headline(table(("reference", 1e-9, 1e-6, 1.0), ("other", 1e-9, 1e-8, 1.0))).iloc[0]
     assert np.isnan(found["ratio"])
