@@ -18,7 +18,7 @@ from crossbody.cases.remembered import remembered
 from crossbody.cases.rotations import normalised, rates
 from crossbody.cases.scene import Scene
 from crossbody.cases.scene_contacts import WAYS, Contact, contacts
-from crossbody.engines.nearest import lying
+from crossbody.engines.nearest import across, lying
 from crossbody.reports.judging.audit import AuditRow
 from crossbody.reports.measuring.equations import equations
 from crossbody.reports.scenes.scene import Pose, body_poses, meeting, placed
@@ -69,7 +69,7 @@ def gaps_against(case: Case, system: System) -> tuple[AuditRow, ...]:
         gaps.append(_gaps(contact, mine, theirs, sure))
         if contact.friction > 0.0:
             own = moves[:, rub : rub + 2 * contact.places].reshape(len(q), contact.places, len(WAYS))
-            slips.append(_slips(contact, sides, (theirs, normals, points), np.linalg.norm(own, axis=2), sure))
+            slips.append(_slips(contact, sides, (theirs, normals, points), own, sure))
     rows = [_compared("gaps of pairs", gaps, EXACT)]
     return (*rows, _compared("slips of pairs", slips, SMOOTH)) if slips else tuple(rows)
 
@@ -161,9 +161,10 @@ def _depth(contact: Contact) -> float:
 def _slips(
     contact: Contact, sides: list[Mapping[str, Pose]], met: tuple[Floats, ...], mine: Floats, sure: NDArray[np.bool_]
 ) -> tuple[Floats, Floats, Floats]:
-    """Return speeds (k,) of shapes over each other where they meet, by H v and by material, and those of bodies.
+    """Return velocities (2 k,) of shapes over each other where they meet, by H v and by material, and speeds of bodies.
 
-    Over a plane it is that of the point of the shape, of two solids that of the first one.
+    They are counted along the two directions of tangential rows. Over a plane it is that of the point of the shape, of
+    two solids that of the first one.
     """
     gaps, normals, points = met
     (before, x, behind) = (points if k == 1 else meeting(contact, bodies)[2] for k, bodies in enumerate(sides))
@@ -171,13 +172,16 @@ def _slips(
     there = x if contact.first.type == "plane" else x - np.where(np.isfinite(gaps), gaps, 0.0)[..., None] * normals
     one, two = (_carried(shape.body, sides, there) for shape in (contact.first, contact.second))
     apart = two - one
-    across = apart - np.einsum("mki,mki->mk", apart, normals)[..., None] * normals
+    shapes = (contact.first, contact.second)
+    at, by = (placed(sides[1][one.body], one.position, one.orientation)[1][:, None] for one in shapes)
+    ways = across(contact.first.type, at, by, normals)
+    along = np.einsum("mki,mkji->mkj", apart, ways)
     fast = np.maximum(np.linalg.norm(one, axis=-1), np.linalg.norm(two, axis=-1))
     with np.errstate(invalid="ignore"):  # where shapes have no normal nothing is compared
         smooth = wander <= WANDERS * fast
     normal = np.abs(np.linalg.norm(normals, axis=-1) - 1.0) < EXACT
     kept = sure[:, None] & np.isfinite(gaps) & normal & smooth & (fast > 0.0) & (gaps > -_depth(contact))
-    return mine[kept], np.linalg.norm(across, axis=-1)[kept], fast[kept]
+    return mine[kept].ravel(), along[kept].ravel(), np.repeat(fast[kept], len(WAYS))
 
 
 def _carried(body: str, sides: list[Mapping[str, Pose]], x: Floats) -> Floats:
