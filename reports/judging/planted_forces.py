@@ -71,8 +71,14 @@ def _impulses(plain: Plain, least: float) -> Iterator[Control]:
 
 
 def carries(run: Trajectory, least: float) -> bool:
-    """Whether the impulse of a row is that of a force, N, that acts throughout, or more: errors are measured by it."""
-    return float(np.max(np.abs(np.trapezoid(run.lam, run.t, axis=0)), initial=0.0)) >= least * float(np.ptp(run.t))
+    """Whether the impulse of a row is that of a force, N, that acts throughout, or more: errors are measured by it.
+
+    With those of collisions that take no time.
+    """
+    sums = np.abs(np.trapezoid(run.lam, run.t, axis=0))
+    for event in run.events:
+        sums[event.contact] += abs(event.impulse)
+    return float(np.max(sums, initial=0.0)) >= least * float(np.ptp(run.t))
 
 
 LARGE = (1.0 / ROUGH, np.inf)
