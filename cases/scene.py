@@ -204,10 +204,12 @@ class Shape(_Named):
     sizes: ClassVar[dict[str, int]] = {"size": 3, "position": 3, "orientation": 4, "friction": 3}
 
     def __post_init__(self) -> None:
-        """Check the friction; that a hull, and nothing else, has corners, and that they fill a space."""
+        """Check size and friction; that a hull, and nothing else, has corners, and that they fill a space."""
         _Named.__post_init__(self)
         _check_friction(self)
         what = f"Shape {self.name!r}"
+        if min(self.size) < 0.0:
+            raise SceneError(f"{what}: size is {shown(self.size)}; valid: lengths of at least 0 m.")
         found = points(f"{what}: corners", self.corners)
         object.__setattr__(self, "corners", found)
         if (self.type == "hull") != bool(found):

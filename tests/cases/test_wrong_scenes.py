@@ -83,6 +83,7 @@ def test_every_number_of_a_part_is_a_float_whatever_real_number_it_was_given_as(
 
 
 WRONG: list[tuple[type, dict[str, Any], str]] = [
+    (Shape, {"size": (-1.0, 0.0, 0.0)}, r"Shape 'a': size is .*; valid: lengths of at least 0 m"),
     (Body, {"name": ""}, "Body.name is ''; it must be a text"),
     (Body, {"com": (0.0, 0.0)}, "com is .*; it must be 3 numbers"),
     (Body, {"mass": "1", "com": "abc"}, "com is 'abc'; it must be 3 numbers"),
