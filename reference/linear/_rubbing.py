@@ -103,10 +103,12 @@ def independent(at: Point) -> Point:
 def check_idle(at: Point, H: Floats, vd: Floats, law: Floats, free: Floats) -> None:
     """Refuse idle rows whose law H vd + law = 0 does not follow from those of the others, at the point or beside it.
 
-    What moves without any rows, free, is the size of what may cancel.
+    H and law have all active rows, those of the idle ones last in law. What moves the active rows without any, free, is
+    with their laws the size of what may cancel: a row that nothing moves is zero but for rounding.
     """
-    off, size = np.abs(H @ vd + law), np.abs(H) @ np.abs(free) + np.abs(law)
-    if not off.max(initial=0.0) <= HELD * size.max(initial=0.0):
+    off = np.abs(H[at.held] @ vd + law[-len(at.held) :]) if len(at.held) else np.zeros(0)
+    size = max(float((np.abs(H) @ np.abs(free)).max(initial=0.0)), float(np.abs(law).max(initial=0.0)))
+    if not off.max(initial=0.0) <= HELD * size:
         raise SceneError(
             f"linearise: rows {at.idle.tolist()} follow from the other active ones at q = {at.q.tolist()}, "
             "but their laws do not: no motion satisfies all of them; leave some contacts out."
