@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from crossbody.reports.figures.section import Figure
-from crossbody.reports.figures.styles import COLOURS, DASHES, Panels, plain
+from crossbody.reports.figures.styles import COLOURS, DASHES, Panels, look, plain
 from crossbody.reports.maps.gapmap import PATTERN
 
 FAILED = {"symbol": "x-thin", "size": 9, "line": {"width": 2, "color": "crimson"}}
@@ -40,7 +40,8 @@ def gap_map(rows: pd.DataFrame) -> Figure:
 
 def _traces(group: pd.DataFrame, column: str, name: str, style: int, legend: bool) -> list[dict[str, Any]]:
     values = pd.to_numeric(group[column])
-    line = {"color": COLOURS[style % len(COLOURS)], "dash": DASHES[style % len(DASHES)], "width": 1.8}
+    who = name.partition(",")[0]  # of one engine's machines each has a dash of its own
+    line = {"color": look(who)["color"], "dash": DASHES[style % len(DASHES)], "width": 1.8}
     usual = {"name": name, "legendgroup": name, "showlegend": legend}
     found = [usual | {"x": group["s"].astype(float), "y": values, "mode": "lines", "line": line}]
     failed = group[group["outcome"] != "finished"]
