@@ -52,7 +52,7 @@ def _at_best(own: Mapping[str, Row], metric: str) -> str:
         return ""
     if least >= abs(own[metric]["value"]):
         return f" there, but elsewhere the model alone is off by {least:.2g}"
-    return f", to {least:.2g} at best, which the model alone is off elsewhere"
+    return f", to {least:.2g} at best: by so much the model alone is off at another instant"
 
 
 def _number(value: float | None) -> float:

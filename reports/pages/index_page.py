@@ -59,7 +59,7 @@ def changes(now: Sequence[Row], before: Sequence[Row], name: str) -> Section:
     moved = moves(row for row in kept if row["verdict"] == row["verdict_before"])
     text = (
         f"Against {name}: {len(words)} of {len(kept)} verdicts changed, {len(moved)} values "
-        f"moved by more than {MOVED:.0%} of the narrower of both limits, {bounds} limits are others, "
+        f"moved by more than {MOVED:.0%} of the narrower of both limits, limits changed: {bounds}, "
         f"{len(here.keys() - known)} rows are new, {len(gone)} are gone."
     )
     told = [f"{len(left)} cases of it were not run now."] if left else []

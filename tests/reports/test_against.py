@@ -52,6 +52,6 @@ def test_a_value_that_moved_is_listed_whatever_becomes_of_its_limit(seed: int) -
     assert bool(listed) == (by > 0.1 * limits.min())
     if listed:
         assert (listed[0]["limit_before"], listed[0]["limit"], listed[0]["unit"]) == (limits[0], limits[1], "")
-    assert "1 limits are others" in found.text
+    assert "limits changed: 1" in found.text
     assert "0 are gone. 1 cases of it were not run now." in found.text
     assert found.text.endswith("e:p ran with rtol=1e-07 instead of 1e-09.")

@@ -271,6 +271,9 @@ def test_parts_keep_their_signs_and_a_step_makes_no_error_smaller_than_the_model
     if abs(model) > abs(whole - model):
         assert "no shorter step makes it smaller" in said
     elif 2.0 * abs(model) < whole:
-        assert f"makes it smaller, to {2.0 * abs(model):.2g} at best, which the model alone is off elsewhere" in said
+        assert (
+            f"makes it smaller, to {2.0 * abs(model):.2g} at best: by so much the model alone is off at another instant"
+            in said
+        )
     else:
         assert f"makes it smaller there, but elsewhere the model alone is off by {2.0 * abs(model):.2g}" in said
