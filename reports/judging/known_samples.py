@@ -104,7 +104,7 @@ def _signals() -> Iterator[Asked]:
     t = np.arange(4.0)
     bend = 1.0 - (t[:, None] - PEAK) ** 2
     risen = multipliers(_run(t, bend, np.ones((4, 1)), bend))
-    yield "largest multiplier", "a parabola", np.inf if risen is None else float(risen.max()), 1.0
+    yield "multipliers", "a parabola", np.inf if risen is None else float(risen.max()), 1.0
 
 
 def _lines() -> Iterator[Asked]:

@@ -98,9 +98,9 @@ def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 
         grid: points on the horizon.
         inside: most points on each interval between events that is shorter than a tenth of the horizon.
     """
-    twice = run.t[1:][np.diff(run.t) == 0.0]
-    events = np.array([e.t for e in run.events if e.t <= t_end])
-    events = np.concatenate([events, twice[(twice <= t_end) & ~np.isin(twice, events)]])
+    told = [e.t for e in run.events if e.t <= t_end]
+    twice = run.t[1:][np.diff(run.t) == 0.0].tolist()
+    events = np.array([*told, *(t for t in twice if t <= t_end and t not in told)])
     parts = [np.linspace(0.0, t_end, grid)]
     edges = distinct(0.0, events, t_end)
     short = [(a, b) for a, b in pairwise(edges) if b - a < 0.1 * t_end]

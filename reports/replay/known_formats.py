@@ -107,15 +107,15 @@ def _tdms(path: Path, data: Table) -> None:
             writer.write_segment([ChannelObject("rig", name, values[part]) for name, values in data.items()])
 
 
-WRITERS: dict[str, tuple[str, Callable[[Path, Table], None], str]] = {
-    "log.csv": ("csv", _csv, "{name}"), "log.parquet": ("pyarrow", _parquet, "{name}"),
-    "log.mat": ("scipy", _mat, "log.{name}"), "log.h5": ("h5py", _hdf5, "rig/{name}"),
-    "wide.mat": ("scipy", partial(_matrix, rows=True), "M[{place}]"),
-    "tall.mat": ("scipy", partial(_matrix, rows=False), "M[{place}]"),
-    "log.mcap": ("mcap", _mcap, "/rig.{name}"), "log.bag": ("rosbags", _ros, "/rig.{name}"),
-    "log.tdms": ("nptdms", _tdms, "rig/{name}"),
+WRITERS: dict[str, tuple[str, str, Callable[[Path, Table], None], str]] = {
+    "log.csv": ("csv", "csv", _csv, "{name}"), "log.parquet": ("parquet", "pyarrow", _parquet, "{name}"),
+    "log.mat": ("mat", "scipy", _mat, "log.{name}"), "log.h5": ("hdf5", "h5py", _hdf5, "rig/{name}"),
+    "wide.mat": ("mat", "scipy", partial(_matrix, rows=True), "M[{place}]"),
+    "tall.mat": ("mat", "scipy", partial(_matrix, rows=False), "M[{place}]"),
+    "log.mcap": ("mcap", "mcap", _mcap, "/rig.{name}"), "log.bag": ("ros1", "rosbags", _ros, "/rig.{name}"),
+    "log.tdms": ("tdms", "nptdms", _tdms, "rig/{name}"),
 }  # fmt: skip
-"""File -> the library that writes it, what does, and how it calls a column by its name or place in the table."""
+"""File -> its format, the library that writes it, what does, and how it calls a column by its name or place."""
 
 
 @cache
@@ -123,7 +123,7 @@ def wrong() -> tuple[Found, ...]:
     """Return what, number, least and most, and of which file, where a log is read as another one."""
     return tuple(
         found
-        for name, (library, *_) in WRITERS.items()
+        for name, (_, library, *_) in WRITERS.items()
         if find_spec(library) is not None
         for found in rows_of(partial(_read, name), partial(_failed, name))
     )
@@ -135,11 +135,12 @@ def _failed(name: str, why: str) -> Found:
 
 def _read(name: str) -> Iterator[Found]:
     """Yield the number of rows, and the first time and value, that are others than were written."""
-    _, write, called = WRITERS[name]
+    kind, _, write, called = WRITERS[name]
     data = table()
     t, angle = (called.format(name=one, place=i) for i, one in enumerate(data))
     columns = parse_columns(
-        f'[time]\ncolumn = "{t}"\nunit = "s"\n[sensors.angle]\ncolumn = "{angle}"\nunit = "mrad"\nscale = {SCALE}\n'
+        f'format = "{kind}"\n[time]\ncolumn = "{t}"\nunit = "s"\n'
+        f'[sensors.angle]\ncolumn = "{angle}"\nunit = "mrad"\nscale = {SCALE}\n'
     )
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder) / name, data)

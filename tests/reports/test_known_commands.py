@@ -43,7 +43,7 @@ COMMANDS = {
     "stress": ("stress", "stiffness", "--runs", "1", "-q", "--out", "out"),
     "gapmap": ("gapmap", "--n", "2", "--points", "2", "-q", "--out", "out"),
     "bode": ("bode", "soft_contact", "-q", "--out", "out"),
-    "list": ("list", "cart.xml"),
+    "list": ("list", str(SUPPORT / "driven_ball.xml")),
 }  # fmt: skip
 MODULES = {
     "replay": known_replay, "identify": known_fits, "doubts": known_doubts, "bench": known_bench,
@@ -122,14 +122,14 @@ def test_a_number_that_is_off_is_told(what: str, monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize("column", ["t", "angle"])
 def test_a_log_that_is_read_as_another_one_is_told(column: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    library, write, before = known_formats.WRITERS["log.mat"]
+    kind, library, write, before = known_formats.WRITERS["log.mat"]
 
     def other(path: Path, data: known_formats.Table) -> None:
         write(path, data | {column: data[column] * (1.0 + 1e-12)})
 
     known_formats.wrong.cache_clear()
     assert known_formats.wrong() == ()
-    monkeypatch.setitem(known_formats.WRITERS, "log.mat", (library, other, before))
+    monkeypatch.setitem(known_formats.WRITERS, "log.mat", (kind, library, other, before))
     known_formats.wrong.cache_clear()
     assert {what for *_, what in known_formats.wrong()} == {"log.mat"}
     known_formats.wrong.cache_clear()
