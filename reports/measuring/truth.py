@@ -99,8 +99,8 @@ def sample_times(run: Trajectory, t_end: float, grid: int = 2001, inside: int = 
         inside: most points on each interval between events that is shorter than a tenth of the horizon.
     """
     told = [e.t for e in run.events if e.t <= t_end]
-    twice = run.t[1:][np.diff(run.t) == 0.0].tolist()
-    events = np.array([*told, *(t for t in twice if t <= t_end and t not in told)])
+    twice, known = run.t[1:][np.diff(run.t) == 0.0].tolist(), set(told)
+    events = np.array([*told, *(t for t in twice if t <= t_end and t not in known)])
     parts = [np.linspace(0.0, t_end, grid)]
     edges = distinct(0.0, events, t_end)
     short = [(a, b) for a, b in pairwise(edges) if b - a < 0.1 * t_end]
