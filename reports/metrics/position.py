@@ -10,7 +10,7 @@ from crossbody.cases.arrays import Floats
 from crossbody.reports.measuring.alignment import aligned
 from crossbody.reports.measuring.apart import errors
 from crossbody.reports.measuring.placed import Placed, largest
-from crossbody.reports.measuring.scale import RESTS, ROUNDING, SMALL, scale_of
+from crossbody.reports.measuring.scale import RESTS, ROUNDING, scale_of
 from crossbody.reports.measuring.truth import Truth, taken
 
 UNIT = "1"
@@ -61,4 +61,4 @@ def gap_scale_of(truth: Truth, case: Case, rows: NDArray[np.bool_]) -> Floats:
     slopes = np.abs(system.equations_along(motion.t[some], motion.q[some], motion.v[some])[2][:, rows])
     sizes = np.delete(scale_of(motion, case), [at + 3 for at in case.quaternions])
     known: Floats = np.max(slopes * sizes, axis=(0, 2))
-    return np.maximum(own, np.minimum(known, max(most, SMALL)))  # absolute tolerances are 1e-6 of that
+    return np.maximum(own, np.minimum(known, most))
