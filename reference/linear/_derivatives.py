@@ -97,7 +97,7 @@ def saddle(at: Point) -> tuple[Floats, Floats, Floats]:
     K = np.block([[M, -pushed], [held, np.zeros((na, na))]])
     right[: at.system.n] += rubbed @ H
     vd, lam = np.split(np.linalg.solve(K, right), [at.system.n])
-    check_idle(at, H, vd, np.append(law, law[at.held]), np.linalg.solve(M, f))
+    check_idle(at, H[at.held] @ vd + law[at.held], np.abs(H) @ np.abs(np.linalg.solve(M, f)), law)
     return K, vd, lam
 
 
@@ -117,7 +117,7 @@ def implied(at: Point, K: Floats, columns: Floats, borne_x: Floats) -> tuple[Flo
     solved = -np.asarray(np.linalg.solve(K, columns[:m]), dtype=np.float64)
     H = terms(at, at.q, at.v, at.u)[2]
     free = np.asarray(np.linalg.solve(K[:n, :n], columns[:n]), dtype=np.float64)
-    check_idle(at, H, solved[:n], columns[n:], free)
+    check_idle(at, H[at.held] @ solved[:n] + columns[m:], np.abs(H) @ np.abs(free), columns[n:])
     m -= n
     spread = borne(at, H, at.v, np.eye(m)) - borne(at, H, at.v, np.zeros((m, m)))
     return solved[:n], borne_x + spread @ solved[n:]

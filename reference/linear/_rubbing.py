@@ -100,15 +100,13 @@ def independent(at: Point) -> Point:
     return replace(at, idle=np.array(idle, dtype=np.int64), sharing=np.array(sorted(sharing), dtype=np.int64))
 
 
-def check_idle(at: Point, H: Floats, vd: Floats, law: Floats, free: Floats) -> None:
-    """Refuse idle rows whose law H vd + law = 0 does not follow from those of the others, at the point or beside it.
+def check_idle(at: Point, off: Floats, *terms: Floats) -> None:
+    """Refuse idle rows that are off their laws by more than rounding of the terms of all active rows.
 
-    H and law have all active rows, those of the idle ones last in law. What moves the active rows without any, free, is
-    with their laws the size of what may cancel: a row that nothing moves is zero but for rounding.
+    A row that nothing moves has no terms of its own, and is zero but for rounding of others.
     """
-    off = np.abs(H[at.held] @ vd + law[-len(at.held) :]) if len(at.held) else np.zeros(0)
-    size = max(float((np.abs(H) @ np.abs(free)).max(initial=0.0)), float(np.abs(law).max(initial=0.0)))
-    if not off.max(initial=0.0) <= HELD * size:
+    size = max(float(np.abs(each).max(initial=0.0)) for each in terms)
+    if not np.abs(off).max(initial=0.0) <= HELD * size:
         raise SceneError(
             f"linearise: rows {at.idle.tolist()} follow from the other active ones at q = {at.q.tolist()}, "
             "but their laws do not: no motion satisfies all of them; leave some contacts out."

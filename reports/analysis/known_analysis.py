@@ -48,22 +48,9 @@ OMEGA = np.array([0.1, 3.0, 6.2, 6.5, 40.0, 900.0])
 @cache
 def wrong() -> tuple[Found, ...]:
     """Return which number, as it is, least and most, and of what, where it is another one."""
-    kinds = (
-        _weight,
-        _responses,
-        _ranks,
-        _poles,
-        _words,
-        _loci,
-        _curves,
-        _engines,
-        _ball,
-        _chain,
-        _filtered,
-        _stuck,
-        _slid,
-    )
-    return unlike_by(kinds, "analysis", "a model that ends in", SOLVED, 1e-3)
+    models = (_weight, _responses, _ranks, _poles, _words, _loci, _curves)
+    scenes = (_engines, _ball, _chain, _filtered, _stuck, _slid)
+    return unlike_by((*models, *scenes), "analysis", "a model that ends in", SOLVED, 1e-3)
 
 
 def _rows(table: pd.DataFrame) -> list[dict[Any, Any]]:
@@ -313,10 +300,8 @@ def _upon_floor(ways: str, speed: float) -> list[float]:
     )  # fmt: skip
     q0, v0 = np.zeros((2, len(ways)))
     q0[-1], v0[0] = 0.1, speed
-    found: list[float] = numbers.poles(places(case_of(scene, name="made_up", q0=q0, v0=v0, t_end=0.01)))[
-        "real"
-    ].tolist()
-    return sorted(found)
+    found = numbers.poles(places(case_of(scene, name="made_up", q0=q0, v0=v0, t_end=0.01)))
+    return sorted(found["real"].tolist())
 
 
 def _stuck() -> Iterator[Asked]:
